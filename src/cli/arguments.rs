@@ -10,6 +10,7 @@ use crate::cli::diagnose::DiagnoseArguments;
 use crate::cli::evaluate::EvaluateArguments;
 use crate::cli::exit;
 use crate::cli::export::ExportArguments;
+use crate::cli::generate::GenerateArguments;
 use crate::cli::noise::NoiseArguments;
 use crate::cli::plan::PlanArguments;
 use crate::cli::report::ReportArguments;
@@ -19,11 +20,12 @@ use crate::cli::run::RunArguments;
 use crate::cli::screenshot::ScreenshotArguments;
 use crate::cli::simulate::SimulateArguments;
 use crate::cli::sweep::{SweepArguments, SweepJobArguments};
+use crate::cli::version::version;
 use crate::cli::view::ViewArguments;
 
 /// Debugger for visual-inertial navigation with a camera on a gimbal.
 #[derive(Debug, Parser)]
-#[command(version, about, propagate_version = true)]
+#[command(version = version(), about, propagate_version = true)]
 pub(crate) struct Arguments {
     /// Command; without one the window opens.
     #[command(subcommand)]
@@ -84,4 +86,7 @@ pub(crate) enum Command {
     /// Write a rig as the configuration of Kalibr, VINS-Fusion, OpenVINS, Basalt or ORB-SLAM3.
     #[command(after_help = exit::PLAIN)]
     Export(ExportArguments),
+    /// Print shell completions or write manual pages, for packages.
+    #[command(hide = true)]
+    Generate(GenerateArguments),
 }

@@ -13,6 +13,7 @@ mod exit;
 mod export;
 #[cfg(feature = "gui")]
 mod figure_arguments;
+mod generate;
 mod interrupt;
 mod limit_arguments;
 mod noise;
@@ -38,6 +39,7 @@ mod study_report;
 mod sweep;
 mod terminal;
 mod value_parsers;
+mod version;
 mod view;
 
 use clap::Parser as _;
@@ -74,6 +76,7 @@ pub(crate) fn run() -> anyhow::Result<ExitOutcome> {
         Command::Convert(arguments) => convert::convert(&arguments),
         Command::Evaluate(arguments) => done(evaluate::evaluate(&arguments)),
         Command::Export(arguments) => done(export::export(&arguments)),
+        Command::Generate(arguments) => done(generate::generate(&arguments)),
     };
     match result {
         Err(error) if error.downcast_ref::<SourceError>().is_some_and(SourceError::is_interrupted) => {
