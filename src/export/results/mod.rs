@@ -81,6 +81,7 @@ impl Results {
             ..Odometry::at_rest(&run_world, &imu, pose)
         };
         self.log.write_odometry(&self.names.topic("odometry"), times, &odometry)?;
+        self.log.write_pose(&self.names.topic("pose"), &run_world, times, &pose)?;
         let points: Vec<_> =
             report.landmarks.iter().map(|landmark| (short_id(landmark.id), landmark.position_m)).collect();
         self.log.write_points(&self.names.topic("landmarks"), &run_world, times, &points)?;
@@ -92,6 +93,8 @@ impl Results {
             let mut poses: Vec<_> = newest_first.copied().collect();
             poses.reverse();
             self.log.write_path(&self.names.topic("path"), &run_world, times, &poses)?;
+            let poses = poses.iter().map(|(_, pose)| pose);
+            self.log.write_poses(&self.names.topic("poses"), &run_world, times, poses)?;
         }
         Ok(())
     }

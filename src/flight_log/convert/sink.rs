@@ -253,6 +253,17 @@ impl<'a> LogSink<'a> {
                     Err(error) => Err(format!("it cannot be decoded: {error}")),
                 }
             }
+            // Viewers decode videos in protobuf only.
+            (Some(MessageKind::CompressedVideo), Payload::Cdr(bytes)) => {
+                match read_video_packet(MessageKind::CompressedVideo, bytes) {
+                    Ok(packet) => {
+                        let times = MessageTimes { stamp_ns: packet.stamp_ns, ..times };
+                        let (frame_id, format) = (packet.frame_id, packet.format);
+                        Ok(self.writer.write_compressed_video(topic, frame_id, times, format, packet.data)?)
+                    }
+                    Err(error) => Err(format!("it cannot be decoded: {error}")),
+                }
+            }
             (_, Payload::Protobuf(_)) => {
                 Err("encoded as protobuf, of which only foxglove.CompressedVideo is read".to_owned())
             }

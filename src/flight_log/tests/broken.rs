@@ -307,7 +307,8 @@ fn error_of_imu_topic(name: &str, message_encoding: &'static str) -> (LogError, 
     let folder = TempDir::new().unwrap();
     let path = folder.path().join("other.mcap");
     let mut writer = LogWriter::create(&path, &LogWriterOptions::default()).unwrap();
-    let message_type = MessageType { name, definition_encoding: "", definition: "".into(), message_encoding };
+    let message_type =
+        MessageType { name, definition_encoding: "", definition: b"".as_slice().into(), message_encoding };
     for number in 0..3 {
         let times = MessageTimes { stamp_ns: EPOCH_NS, log_time_ns: EPOCH_NS + number * 5 * MS };
         writer.write_typed("/imu", &message_type, times, &[0; 4]).unwrap();

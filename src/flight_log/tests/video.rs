@@ -11,13 +11,15 @@ use crate::flight_log::{ImageReader, MessageKind, MessageType};
 enum Storage {
     /// `foxglove_msgs/msg/CompressedVideo`.
     Ros,
-    /// `foxglove.CompressedVideo`.
+    /// `foxglove.CompressedVideo`, by the writer of this program.
+    Written,
+    /// The same of another writer.
     Protobuf,
     /// `ffmpeg_image_transport_msgs/msg/FFMPEGPacket`.
     Packet,
 }
 
-const STORAGES: [Storage; 3] = [Storage::Ros, Storage::Protobuf, Storage::Packet];
+const STORAGES: [Storage; 4] = [Storage::Ros, Storage::Written, Storage::Protobuf, Storage::Packet];
 
 fn rig_text() -> String {
     let gimbal = RIG.split_at(RIG.find("gimbal:\n").unwrap()).0;
@@ -91,13 +93,17 @@ fn write(folder: &Path, name: &str, storage: Storage, left_out: &[usize]) -> (Pa
             let data = stream.messages[number];
             match storage {
                 Storage::Ros => {
+                    let message = encode::compressed_video(stamp_ns, "camera", format, data);
+                    writer.write("/camera", MessageKind::CompressedVideo, times(stamp_ns), &message).unwrap();
+                }
+                Storage::Written => {
                     writer.write_compressed_video("/camera", "camera", times(stamp_ns), format, data).unwrap();
                 }
                 Storage::Protobuf => {
                     let schema = MessageType {
                         name: "foxglove.CompressedVideo",
                         definition_encoding: "protobuf",
-                        definition: "".into(),
+                        definition: b"".as_slice().into(),
                         message_encoding: "protobuf",
                     };
                     writer.write_typed("/camera", &schema, times(stamp_ns), &protobuf(stamp_ns, format, data)).unwrap();

@@ -54,7 +54,8 @@ pub(in super::super) fn image(
     out.finish()
 }
 
-/// `foxglove_msgs/msg/CompressedVideo`: one frame in Annex B.
+/// `foxglove_msgs/msg/CompressedVideo` of other writers: one frame in Annex B.
+#[cfg(test)]
 pub(in super::super) fn compressed_video(stamp_ns: i64, frame_id: &str, format: &str, data: &[u8]) -> Vec<u8> {
     let mut out = with_header(stamp_ns, frame_id);
     out.bytes(data);

@@ -1,6 +1,7 @@
 //! Writer of flight logs: MCAP with CDR messages and their definitions, in the layout of ROS 2's recorder.
 
 mod encode;
+mod protobuf;
 mod results;
 mod schemas;
 
@@ -58,18 +59,27 @@ pub struct MessageTimes {
 pub struct MessageType<'a> {
     /// Such as `nav_msgs/msg/Path`.
     pub name: &'a str,
-    /// Language of the definition, `ros2msg` or `jsonschema`.
+    /// Language of the definition, `ros2msg`, `protobuf` or `jsonschema`.
     pub definition_encoding: &'static str,
     /// Definition with all types that it needs.
-    pub definition: Cow<'a, str>,
-    /// Encoding of the messages, `cdr` or `json`.
+    pub definition: Cow<'a, [u8]>,
+    /// Encoding of the messages, `cdr`, `protobuf` or `json`.
     pub message_encoding: &'static str,
 }
 
 impl<'a> MessageType<'a> {
     /// ROS 2 type with messages in CDR.
     pub fn ros2(name: &'a str, definition: impl Into<Cow<'a, str>>) -> Self {
-        Self { name, definition_encoding: "ros2msg", definition: definition.into(), message_encoding: "cdr" }
+        let definition = match definition.into() {
+            Cow::Borrowed(text) => Cow::Borrowed(text.as_bytes()),
+            Cow::Owned(text) => Cow::Owned(text.into_bytes()),
+        };
+        Self { name, definition_encoding: "ros2msg", definition, message_encoding: "cdr" }
+    }
+
+    /// Message of protobuf with its `FileDescriptorSet`.
+    fn protobuf(name: &'a str, definition: Vec<u8>) -> Self {
+        Self { name, definition_encoding: "protobuf", definition: Cow::Owned(definition), message_encoding: "protobuf" }
     }
 }
 
@@ -159,7 +169,7 @@ impl LogWriter {
         self.write(topic, MessageKind::CompressedImage, times, &message)
     }
 
-    /// Writes one frame of a video, in Annex B; `format` is `h264` or `h265`.
+    /// Writes one frame of a video, in Annex B, as `foxglove.CompressedVideo` in protobuf; `format` is `h264` or `h265`.
     pub fn write_compressed_video(
         &mut self,
         topic: &str,
@@ -168,8 +178,8 @@ impl LogWriter {
         format: &str,
         data: &[u8],
     ) -> Result<(), LogError> {
-        let message = encode::compressed_video(times.stamp_ns, frame_id, format, data);
-        self.write(topic, MessageKind::CompressedVideo, times, &message)
+        let message = protobuf::compressed_video(times.stamp_ns, frame_id, format, data);
+        self.write(topic, MessageKind::CompressedVideoProtobuf, times, &message)
     }
 
     /// Writes a raw image of any ROS encoding, rows without padding, multi-byte pixels little-endian.
@@ -301,7 +311,13 @@ impl LogWriter {
         message: &[u8],
     ) -> Result<(), LogError> {
         if !self.channels.contains_key(topic) {
-            self.add_channel(topic, &MessageType::ros2(kind.schema_name(), schemas::definition(kind)))?;
+            let message_type = match kind {
+                MessageKind::CompressedVideoProtobuf => {
+                    MessageType::protobuf(kind.schema_name(), protobuf::compressed_video_definition())
+                }
+                kind => MessageType::ros2(kind.schema_name(), schemas::definition(kind)),
+            };
+            self.add_channel(topic, &message_type)?;
         }
         self.write_to_channel(topic, times, message)
     }
@@ -323,7 +339,7 @@ impl LogWriter {
     fn add_channel(&mut self, topic: &str, message_type: &MessageType<'_>) -> Result<(), LogError> {
         let failed = |error: mcap::McapError| write_error(&self.path, &error);
         let MessageType { name, definition_encoding, definition, message_encoding } = message_type;
-        let schema = self.writer.add_schema(name, definition_encoding, definition.as_bytes()).map_err(failed)?;
+        let schema = self.writer.add_schema(name, definition_encoding, definition).map_err(failed)?;
         let qos = BTreeMap::from([("offered_qos_profiles".to_owned(), QOS_PROFILE.to_owned())]);
         let id = self.writer.add_channel(schema, topic, message_encoding, &qos).map_err(failed)?;
         self.channels.insert(topic.to_owned(), (id, 0));

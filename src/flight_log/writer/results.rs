@@ -6,7 +6,7 @@ use nalgebra::{Vector2, Vector3};
 use super::super::LogError;
 use super::super::cdr::CdrWriter;
 use super::schemas::{self, compose};
-use super::{LogWriter, MessageTimes, MessageType, encode};
+use super::{LogWriter, MessageTimes, MessageType, encode, protobuf};
 use crate::geometry::RigidTransform;
 
 /// Pose of a frame in its parent frame.
@@ -75,6 +75,18 @@ fn put_point(out: &mut CdrWriter, point_px: &Vector2<f64>) {
 }
 
 impl LogWriter {
+    /// Writes poses in one frame as `foxglove.PosesInFrame` in protobuf.
+    pub fn write_poses<'a>(
+        &mut self,
+        topic: &str,
+        frame_id: &str,
+        times: MessageTimes,
+        poses: impl Iterator<Item = &'a RigidTransform>,
+    ) -> Result<(), LogError> {
+        let message_type = MessageType::protobuf(protobuf::POSES_TYPE, protobuf::poses_definition());
+        self.write_typed(topic, &message_type, times, &protobuf::poses_in_frame(times.stamp_ns, frame_id, poses))
+    }
+
     /// Writes poses in one frame as `nav_msgs/msg/Path`, each with its stamp.
     pub fn write_path(
         &mut self,

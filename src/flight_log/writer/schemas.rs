@@ -66,7 +66,7 @@ fn fields(kind: MessageKind) -> Definition<'static> {
         MessageKind::Imu => (fields!("sensor_msgs/Imu"), &[HEADER, TIME, QUATERNION, VECTOR3]),
         MessageKind::Image => (fields!("sensor_msgs/Image"), &[HEADER, TIME]),
         MessageKind::CompressedImage => (fields!("sensor_msgs/CompressedImage"), &[HEADER, TIME]),
-        // Protobuf messages are written with the same fields in ROS 2.
+        // Protobuf has a definition of its own; these are the same fields in ROS 2.
         MessageKind::CompressedVideo | MessageKind::CompressedVideoProtobuf => {
             (fields!("foxglove_msgs/CompressedVideo"), &[TIME])
         }

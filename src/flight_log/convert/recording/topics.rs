@@ -16,7 +16,7 @@ use crate::geometry::RigidTransform;
 const IMU_TYPE: &str = "sensor_msgs/msg/Imu";
 const ROTATION_TYPE: &str = "geometry_msgs/msg/QuaternionStamped";
 const POSE_TYPE: &str = "geometry_msgs/msg/PoseStamped";
-const VIDEO_TYPE: &str = "foxglove_msgs/msg/CompressedVideo";
+const VIDEO_TYPE: &str = "foxglove.CompressedVideo";
 
 /// Topic of an IMU, without its number.
 const IMU_TOPIC: &str = "/imu";
