@@ -97,7 +97,7 @@ fn a_planned_motion_is_flown_by_the_simulation() {
     let folder = tempfile::tempdir().expect("a folder can be made");
     plan(folder.path(), &[&[data("garden.rig.yaml").as_str(), "-o", "plan"], &SMALL[..]].concat(), "2", 0, &[]);
     let simulate = |motion: &str, code: i32, words: &[&str]| {
-        let small = ["--size", "32x24", "--rate", "2", "--no-static-camera"];
+        let small = ["--size", "64x48", "--rate", "2", "--no-static-camera"];
         let arguments = [&["simulate", "T2", "-o", "t2.mcap", "--motion", motion], &small[..]].concat();
         let output = dcvins(folder.path(), &arguments, "2");
         let said = String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).into_owned();
@@ -119,7 +119,7 @@ fn wrong_requests_say_what_is_possible() {
         plan(folder.path(), &[&[garden.as_str(), "-o", "out"], more].concat(), "1", code, words);
     };
     check(&["--parameters", "pitch.q"], 1, &["--parameters names 'pitch.q'", "pitch.beta"]);
-    check(&["--run", "auto:calibrate=off"], 1, &["auto:calibrate=off", "does not estimate the calibration"]);
+    check(&["--run", "auto:calibrate=off"], 1, &["auto-calibrate-off", "does not estimate the calibration"]);
     check(&["--run", "auto:timeshift=on"], 1, &["the chain only"]);
     check(&["--duration", "3"], 2, &["expected seconds from 8 to 120"]);
     check(&["--box", "1,2"], 2, &["three lengths"]);

@@ -30,8 +30,9 @@ pub use experiment::{
 pub use mechanism::{LaboratoryJoint, Mechanism, UnknownMechanism};
 pub use motion::{LaboratoryMotion, UnknownMotion};
 pub use planning::{
-    HandPlan, HandStep, ListedComparison, MotionLimits, MotionPlan, MotionPlanError, PLAN_DURATION_S, PlanCriterion,
-    PlanOptions, PlanStart, PlanTable, PlannedParameter, ReachedLimit, SigmaRow, plan_by_hand, plan_motion,
+    HandPlan, HandStep, ListedComparison, MotionLimits, MotionPlan, MotionPlanError, PLAN_DURATION_S,
+    PLAN_FRAME_PERIOD_S, PlanCriterion, PlanOptions, PlanStart, PlanTable, PlannedParameter, ReachedLimit, SigmaRow,
+    plan_by_hand, plan_motion,
 };
 pub use report::LaboratoryReport;
 pub use sensors::{

@@ -113,7 +113,7 @@ impl Situation {
     ///
     /// `joints` has one entry per joint of the configured chain. The joints start in the middle: at zero, moved so that
     /// at least a quarter of the range lies on both sides. `encoder_sigma_rad` is the standard deviation of an encoder
-    /// angle at an image. `None` when the calibration is fixed or a number is not finite.
+    /// angle at a predicted frame. `None` when the calibration is fixed or a number is not finite.
     pub fn before_flight(
         config: &EstimatorConfig,
         joints: Vec<LaboratoryJoint>,

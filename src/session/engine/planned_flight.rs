@@ -1,7 +1,7 @@
 //! Situation before a flight that is to be planned: a rig, and the run that will estimate its calibration.
 
 use super::configuration::estimator_config;
-use crate::observability::laboratory::{LaboratoryJoint, Situation};
+use crate::observability::laboratory::{LaboratoryJoint, PLAN_FRAME_PERIOD_S, Situation};
 use crate::sensors::{CameraMount, Rig};
 use crate::session::plan::{RunSpec, SessionError, cameras_of_run};
 
@@ -31,9 +31,11 @@ pub fn situation_before_flight(rig: &Rig, spec: &RunSpec, distances_m: Vec<f64>)
     let gimbal = rig.gimbal.as_ref().filter(|_| camera.mount == CameraMount::Gimbal);
     let joints = gimbal.map_or(&[][..], |gimbal| gimbal.joints.as_slice()).iter();
     let joints = joints.map(|joint| LaboratoryJoint { name: joint.name.clone(), limits_rad: joint.limits_rad });
-    let encoder_sigma_rad = config
-        .encoder_in_use()
-        .map(|sigma_rad| averaged_sigma_rad(sigma_rad, gimbal.map_or(0.0, |gimbal| gimbal.rate_hz), camera.rate_hz));
+    let encoder_sigma_rad = config.encoder_in_use().map(|sigma_rad| {
+        let at_image = averaged_sigma_rad(sigma_rad, gimbal.map_or(0.0, |gimbal| gimbal.rate_hz), camera.rate_hz);
+        // The readings at images that do not become keyframes are carried to the next one.
+        at_image / (PLAN_FRAME_PERIOD_S * camera.rate_hz).max(1.0).sqrt()
+    });
     Situation::before_flight(&config, joints.collect(), rig.parameter_names(), encoder_sigma_rad, distances_m)
         .ok_or_else(|| unplannable("the mechanism or its prior is not finite"))
 }
@@ -56,12 +58,12 @@ mod tests {
     fn a_situation_has_the_noise_and_prior_of_its_run() {
         let rig = synthetic_tracks(&SyntheticOptions { duration_s: 0.5, ..SyntheticOptions::default() }).given_rig;
         let of = |spec: &str| situation_before_flight(&rig, &spec.parse().unwrap(), vec![5.0]);
-        let minimal = of("minimal:pixel_noise=2").unwrap();
+        let minimal = of("minimal:pixel-noise=2").unwrap();
         assert_eq!(minimal.chain.parameters().len(), 18);
         assert!((minimal.pixel_sigma_px - 0.5).abs() < 1e-12);
-        // Ten readings per image interval of 50 ms.
+        // Ten readings per image interval of 50 ms, five images per predicted frame.
         let JointKnowledge::Encoder(sigma_rad) = minimal.encoders else { panic!("the rig has encoders") };
-        assert!((sigma_rad / 0.5_f64.to_radians() - 0.225_f64.sqrt()).abs() < 1e-9, "{sigma_rad}");
+        assert!((sigma_rad / 0.5_f64.to_radians() - 0.045_f64.sqrt()).abs() < 1e-9, "{sigma_rad}");
         let (translation_m, rotation_rad) = rig.gimbal.as_ref().unwrap().prior.sigmas();
         let covariance = minimal.information.clone().cholesky().unwrap().inverse();
         for (column, parameter) in minimal.chain.parameters().into_iter().enumerate() {

@@ -23,3 +23,4 @@ pub use plan::{
     ListedComparison, MotionPlan, MotionPlanError, PLAN_DURATION_S, PlanOptions, PlanStart, plan_by_hand, plan_motion,
 };
 pub use summary::{PlanTable, PlannedParameter, SigmaRow};
+pub use windows::PLAN_FRAME_PERIOD_S;

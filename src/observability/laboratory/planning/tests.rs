@@ -131,34 +131,25 @@ fn moves_by_hand_lower_sigma_step_by_step() {
     assert_eq!(by_hand.steps.last().unwrap().worst_ratio, by_hand.table.worst_ratio);
 }
 
-/// Largest relative difference of σ between the sum of two windows and one window over the same frames.
-#[expect(clippy::print_stdout, reason = "the differences are quoted in docs/experiments/planned_motions.md")]
-fn long_window_difference(situation: &Situation, seed: u64) -> f64 {
-    let limits = MotionLimits::slow(situation.joints.iter().map(|joint| joint.limits_rad).collect());
-    let motion = starts::random(situation, &limits, 8.0, &mut SplitMix64::new(seed));
-    let flight = trajectory(situation, &motion);
-    let layout = WindowLayout::fine(8.0);
-    let windows: Vec<DMatrix<f64>> = (0..layout.count)
-        .map(|window| information_of_window(situation, &motion, &flight, &layout, window).unwrap())
-        .collect();
-    let added = sum(&windows, situation.information.ncols());
-    let times_s: Vec<f64> = (0..layout.count).flat_map(|window| layout.times_s(window)).collect();
-    let long = information_of_frames(situation, &motion, &flight, &times_s, layout.landmarks).unwrap();
-    let objective = Objective::new(situation, PlanCriterion::Worst, &[]).unwrap();
-    let (_, added) = objective.sigmas(&added).unwrap();
-    let (_, long) = objective.sigmas(&long).unwrap();
-    let differences: Vec<f64> = added.iter().zip(&long).map(|(added, long)| added / long - 1.0).collect();
-    println!("seed {seed}: σ of two windows over σ of one, minus 1: {differences:.3?}");
-    // A long window has more information, except that its landmarks are drawn elsewhere.
-    assert!(differences.iter().all(|difference| *difference > -0.15), "{differences:?}");
-    differences.into_iter().fold(0.0, f64::max)
-}
-
 #[test]
 fn the_information_of_consecutive_windows_adds_up() {
     let situation = situation("yaw-roll-pitch-offset", Some(0.5_f64.to_radians()));
-    for seed in [1, 2] {
-        let largest = long_window_difference(&situation, seed);
-        assert!(largest < 0.4, "{largest}");
-    }
+    let limits = MotionLimits::slow(situation.joints.iter().map(|joint| joint.limits_rad).collect());
+    let motion = starts::random(&situation, &limits, 8.0, &mut SplitMix64::new(1));
+    let flight = trajectory(&situation, &motion);
+    let layout = WindowLayout::fine(8.0);
+    let windows: Vec<DMatrix<f64>> = (0..layout.count)
+        .map(|window| information_of_window(&situation, &motion, &flight, &layout, window).unwrap())
+        .collect();
+    let added = sum(&windows, situation.information.ncols());
+    let times_s: Vec<f64> = (0..layout.count).flat_map(|window| layout.times_s(window)).collect();
+    let long = information_of_frames(&situation, &motion, &flight, &times_s, layout.landmarks).unwrap();
+    let objective = Objective::new(&situation, PlanCriterion::Worst, &[]).unwrap();
+    let (_, added) = objective.sigmas(&added).unwrap();
+    let (_, long) = objective.sigmas(&long).unwrap();
+    // One long window knows more: velocity and biases at the middle, landmarks on both sides of it.
+    let excess: Vec<f64> = added.iter().zip(&long).map(|(added, long)| added / long - 1.0).collect();
+    assert!(excess.iter().all(|excess| (0.0..0.5).contains(excess)), "{excess:.3?}");
+    let mean = excess.iter().sum::<f64>() / excess.len() as f64;
+    assert!(mean < 0.25, "{excess:.3?}");
 }

@@ -19,6 +19,9 @@ use nalgebra::Vector3;
 /// Rate of the predicted IMU samples, which hardly affects their covariance.
 const IMU_RATE_HZ: f64 = 50.0;
 
+/// Time between the frames of a planned motion, in seconds.
+pub const PLAN_FRAME_PERIOD_S: f64 = ADVICE_DURATION_S / FRAMES as f64;
+
 /// Division of a flight into windows of equal length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct WindowLayout {
