@@ -3,12 +3,11 @@
 use std::path::PathBuf;
 
 use anyhow::{Context as _, Result};
-use clap::{Args, Command, CommandFactory as _, Subcommand};
+use clap::{Args, Command, Subcommand};
 use clap_complete::Shell;
 use clap_mangen::Man;
 use dcvins::flight_log::output;
 
-use crate::cli::arguments::Arguments;
 use crate::cli::terminal::print;
 
 #[derive(Args, Clone, Debug)]
@@ -33,12 +32,13 @@ pub(crate) enum GenerateKind {
     },
 }
 
-pub(crate) fn generate(arguments: &GenerateArguments) -> Result<()> {
+/// Prints or writes the files for `command`, the program with all its arguments.
+pub(crate) fn generate(arguments: &GenerateArguments, command: &Command) -> Result<()> {
     match &arguments.kind {
-        GenerateKind::Completions { shell } => print(&completions(*shell)?),
+        GenerateKind::Completions { shell } => print(&completions(*shell, command)?),
         GenerateKind::Man { output: folder } => {
             std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
-            for (name, page) in manual_pages()? {
+            for (name, page) in manual_pages(command)? {
                 let path = folder.join(name);
                 output::write_file(&path, &page).with_context(|| format!("cannot write {}", path.display()))?;
                 print(&format!("{}\n", path.display()))?;
@@ -48,15 +48,14 @@ pub(crate) fn generate(arguments: &GenerateArguments) -> Result<()> {
     }
 }
 
-fn completions(shell: Shell) -> Result<String> {
+fn completions(shell: Shell, command: &Command) -> Result<String> {
     let mut text = Vec::new();
-    clap_complete::generate(shell, &mut visible(), "dcvins", &mut text);
+    clap_complete::generate(shell, &mut visible(command), "dcvins", &mut text);
     String::from_utf8(text).context("completions are text")
 }
 
 /// The arguments without hidden sub-commands, which completions would offer.
-fn visible() -> Command {
-    let command = Arguments::command();
+fn visible(command: &Command) -> Command {
     let hidden = ["generate", "sweep-job"];
     let shown: Vec<Command> =
         command.get_subcommands().filter(|it| !hidden.contains(&it.get_name())).cloned().collect();
@@ -68,8 +67,8 @@ fn visible() -> Command {
 }
 
 /// Names and contents of the pages of all sub-commands; the page of the program itself is written by hand.
-fn manual_pages() -> Result<Vec<(String, Vec<u8>)>> {
-    let mut command = visible().disable_help_subcommand(true);
+fn manual_pages(command: &Command) -> Result<Vec<(String, Vec<u8>)>> {
+    let mut command = visible(command).disable_help_subcommand(true);
     command.build();
     let mut pages = Vec::new();
     let mut waiting: Vec<Command> = command.get_subcommands().cloned().collect();
@@ -86,14 +85,15 @@ fn manual_pages() -> Result<Vec<(String, Vec<u8>)>> {
 
 #[cfg(test)]
 mod tests {
-    use clap::ValueEnum as _;
+    use clap::{CommandFactory as _, ValueEnum as _};
 
     use super::*;
+    use crate::cli::arguments::Arguments;
 
     #[test]
     fn completions_of_every_shell_have_the_commands_and_options() {
         for shell in Shell::value_variants() {
-            let text = completions(*shell).unwrap();
+            let text = completions(*shell, &Arguments::command()).unwrap();
             for word in ["screenshot", "convert", "video-offset", "camera-link"] {
                 assert!(text.contains(word), "{shell}: {word}");
             }
@@ -103,7 +103,7 @@ mod tests {
 
     #[test]
     fn every_command_has_a_page_with_its_options() {
-        let pages = manual_pages().unwrap();
+        let pages = manual_pages(&Arguments::command()).unwrap();
         let page = |name: &str| {
             let found = pages.iter().find(|(known, _)| known == name).map(|(_, page)| page.clone());
             String::from_utf8(found.unwrap_or_else(|| panic!("no page {name}"))).unwrap()

@@ -42,7 +42,7 @@ mod value_parsers;
 mod version;
 mod view;
 
-use clap::Parser as _;
+use clap::{CommandFactory as _, Parser as _};
 use dcvins::export::SourceError;
 use dcvins::flight_log::printable_lines;
 
@@ -76,7 +76,7 @@ pub(crate) fn run() -> anyhow::Result<ExitOutcome> {
         Command::Convert(arguments) => convert::convert(&arguments),
         Command::Evaluate(arguments) => done(evaluate::evaluate(&arguments)),
         Command::Export(arguments) => done(export::export(&arguments)),
-        Command::Generate(arguments) => done(generate::generate(&arguments)),
+        Command::Generate(arguments) => done(generate::generate(&arguments, &Arguments::command())),
     };
     match result {
         Err(error) if error.downcast_ref::<SourceError>().is_some_and(SourceError::is_interrupted) => {

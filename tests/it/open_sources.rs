@@ -37,7 +37,8 @@ fn a_bag_is_checked_like_a_log_and_kept_in_the_cache() {
     let [entry] = entries().try_into().expect("one entry");
     assert!(entry.join("flight.mcap").is_file() && entry.join("report.txt").is_file());
     // The second command finds the log; a rig next to the recording goes before the attached one.
-    fs::copy(sample("garden.rig.yaml"), folder.path().join("flight.rig.yaml")).unwrap();
+    let rig = fs::read_to_string(sample("garden.rig.yaml")).unwrap().replace("name: garden", "name: flight");
+    fs::write(folder.path().join("flight.rig.yaml"), rig).unwrap();
     let (_, text, notices) = dcvins(&cache, &["check", &bag]);
     assert!(!notices.contains("converted") && entries() == [entry], "{notices}");
     assert!(text.contains("flight.mcap: 8.500 s, rig flight"), "{text}");

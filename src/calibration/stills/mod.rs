@@ -1,8 +1,8 @@
 //! Calibration of a gimbal from still images of known points, joint readings and rigid cameras, without IMU.
 //!
-//! 1. The pose of every camera is refined on its own points ([`view_pose`]).
-//! 2. Pose loops ([`observed`]) compare rigid camera, chain and gimbal camera in each set. Joint angles are the readings
-//!    with noise; the standard deviations of encoders and map are estimated with the chain ([`fit`]), and sets whose
+//! 1. The pose of every camera is refined on its own points (`view_pose`).
+//! 2. Pose loops (`observed`) compare rigid camera, chain and gimbal camera in each set. Joint angles are the readings
+//!    with noise; the standard deviations of encoders and map are estimated with the chain (`fit`), and sets whose
 //!    readings contradict the images lose them.
 //! 3. Parameters with σ in every parameterization, ranks, systematic errors of the encoders, and errors in pixels on
 //!    training and held-out sets.

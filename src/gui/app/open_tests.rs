@@ -116,10 +116,13 @@ fn a_log_without_a_rig_is_opened_with_a_found_a_dropped_or_a_new_one() {
     assert!(harness.query_by_label_contains("with the rig /flights/other.rig.yaml").is_some());
     harness.get_by_role_and_label(egui::Role::Button, "Open").click();
     run_until(&mut harness, |_| rig_of_last() == Some(PathBuf::from("/flights/other.rig.yaml")));
+    run_until(&mut harness, |harness| harness.state().opening.is_none());
 
     harness.state_mut().rig_page = Some(RigPage::new(question(&OpenRequest::of("/flights/yard.bag".into()))));
     harness.run_steps(2);
     run_until(&mut harness, |harness| harness.query_by_label_contains("values assumed; measure or confirm").is_some());
+    // The dialog grows with the values, and its buttons move.
+    harness.run_steps(5);
     harness.get_by_label("Save and open").click();
     run_until(&mut harness, |_| rig_of_last() == Some(PathBuf::from("/flights/yard.rig.yaml")));
     let rigs = desktop.rigs.lock().unwrap();

@@ -244,6 +244,7 @@ pub(super) fn app() -> (Harness<'static, App>, Arc<TestDesktop>) {
 }
 
 /// Runs frames until the condition is true; logs are opened on another thread.
+#[track_caller]
 pub(super) fn run_until(harness: &mut Harness<'static, App>, holds: impl Fn(&Harness<'static, App>) -> bool) {
     for _ in 0..2000 {
         harness.run_steps(1);

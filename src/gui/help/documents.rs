@@ -18,7 +18,7 @@ macro_rules! document {
 }
 
 /// The manual is first.
-const DOCUMENTS: [Document; 27] = [
+const DOCUMENTS: [Document; 28] = [
     document!("docs/manual.md"),
     document!("docs/tutorial.md"),
     document!("docs/recordings.md"),
@@ -45,6 +45,7 @@ const DOCUMENTS: [Document; 27] = [
     document!("docs/experiments/speed_and_memory.md"),
     document!("docs/experiments/regression_guard.md"),
     document!("docs/experiments/heading_in_an_orbit.md"),
+    document!("docs/experiments/planned_motions.md"),
     document!("docs/experiments/tried_and_not_used.md"),
 ];
 
@@ -124,7 +125,7 @@ mod tests {
             |id: usize, anchor: Option<&str>| Some(LinkTarget::Section(DocumentId(id), anchor.map(str::to_owned)));
         assert_eq!(manual.follow("#rank"), section(0, Some("rank")));
         assert_eq!(manual.follow("commands.md"), section(3, None));
-        assert_eq!(manual.follow("../assets/README.md"), section(10, None));
+        assert_eq!(manual.follow("../assets/README.md"), section(11, None));
         assert_eq!(manual.follow("https://mcap.dev"), Some(LinkTarget::Web("https://mcap.dev".to_owned())));
         assert_eq!(manual.follow("nowhere.md#rank"), None);
         assert!(manual.has_anchor("rank") && !manual.has_anchor("nowhere"));

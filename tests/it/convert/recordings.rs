@@ -31,6 +31,11 @@ fn messages(log: &Path) -> Messages {
     let mut messages = Messages::new();
     for message in mcap::MessageStream::new(&bytes).expect("the log is valid") {
         let message = message.expect("the message is valid");
+        if message.channel.message_encoding == "protobuf" {
+            let entry = (protobuf_stamp_ns(&message.data), message.log_time as i64, Vec::new());
+            messages.entry(message.channel.topic.clone()).or_default().push(entry);
+            continue;
+        }
         let word = |at: usize| u32::from_le_bytes(message.data[at..at + 4].try_into().expect("four bytes"));
         let stamp_ns = i64::from(word(4)) * 1_000_000_000 + i64::from(word(8));
         let behind = 12 + 4 + word(12) as usize;
@@ -41,6 +46,20 @@ fn messages(log: &Path) -> Messages {
         messages.entry(message.channel.topic.clone()).or_default().push(entry);
     }
     messages
+}
+
+/// Stamp of a protobuf message whose first field is a `google.protobuf.Timestamp` of seconds and nanoseconds.
+fn protobuf_stamp_ns(data: &[u8]) -> i64 {
+    assert_eq!(data[0], 0x0a, "the first field has a length");
+    let mut stamp = &data[2..2 + usize::from(data[1])];
+    let mut stamp_ns = 0;
+    while let [key, rest @ ..] = stamp {
+        let length = rest.iter().position(|byte| byte & 0x80 == 0).expect("a number ends") + 1;
+        let number = rest[..length].iter().rev().fold(0, |sum, byte| sum << 7 | i64::from(byte & 0x7f));
+        stamp_ns += if *key == 0x08 { number * 1_000_000_000 } else { number };
+        stamp = &rest[length..];
+    }
+    stamp_ns
 }
 
 fn converted(
