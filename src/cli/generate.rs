@@ -21,7 +21,7 @@ pub(crate) struct GenerateArguments {
 pub(crate) enum GenerateKind {
     /// Print the completions of a shell.
     Completions {
-        /// The shell.
+        /// Shell that reads the completions.
         shell: Shell,
     },
     /// Write a manual page for each sub-command, `dcvins-COMMAND.1`.

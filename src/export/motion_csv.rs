@@ -35,7 +35,7 @@ pub(super) fn motion_csv(motion: &MotionSplines, joint_names: &[String]) -> Stri
     table.into_text()
 }
 
-/// Reads a motion.
+/// Reads a motion from a CSV file.
 ///
 /// # Errors
 /// If the file cannot be read, or a column, a number or a time is wrong; the message names the row.

@@ -20,7 +20,7 @@ pub(super) struct PrescribedFlight<'a> {
 }
 
 impl<'a> PrescribedFlight<'a> {
-    /// Interpolates a motion.
+    /// Interpolates a motion between its rows.
     ///
     /// # Errors
     /// If the motion has wrong times, values or joints, or a disturbance changes the motion too.

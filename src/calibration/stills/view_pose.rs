@@ -35,7 +35,7 @@ pub(super) struct ViewPose {
     pub(super) camera_from_world: RigidTransform,
     /// Covariance of `[φ; δt]` of `camera_from_world` by the noise of the pixels, points taken as exact.
     pub(super) covariance: Matrix6<f64>,
-    /// Points that fit.
+    /// Points whose residuals fit the pose.
     pub(super) points: Vec<MapPoint>,
     /// Number of points that do not fit.
     pub(super) left_out: usize,

@@ -98,7 +98,7 @@ pub struct RobotModel {
 }
 
 impl RobotModel {
-    /// Reads a file.
+    /// Reads a robot description from a file.
     ///
     /// # Errors
     /// When it cannot be read, is no URDF, or contains macros of xacro.

@@ -36,7 +36,7 @@ pub struct OpenProgress {
     pub ratio: f64,
 }
 
-/// An open log.
+/// Session of an open log, and how it was opened.
 pub struct OpenedLog {
     pub log: Box<dyn PlayingLog>,
     /// Path for the list of recent logs: a recording opens again by its own path.

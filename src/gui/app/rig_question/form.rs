@@ -86,7 +86,6 @@ impl RigForm {
         }
     }
 
-    /// Draws the fields.
     pub(super) fn ui(&mut self, ui: &mut Ui, theme: &Theme) {
         Grid::new("rig form").num_columns(2).spacing(vec2(12.0, 6.0)).show(ui, |ui| {
             self.mechanism_ui(ui);

@@ -66,7 +66,6 @@ impl RigPage {
         &self.question.request
     }
 
-    /// Draws the dialog.
     pub(in crate::gui::app) fn ui(&mut self, ui: &Ui, theme: &Theme, desktop: &Arc<dyn Desktop>) -> PageAnswer {
         let title = format!("Rig of {}", self.question.request.names());
         let height = (ui.ctx().content_rect().height() - OUTSIDE_HEIGHT).max(200.0);

@@ -21,7 +21,7 @@ use crate::geometry::SplitMix64;
 use crate::gimbal::ParameterId;
 use crate::simulation::MotionSplines;
 
-/// What to plan, in addition to the situation.
+/// Options of a plan beside the situation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlanOptions {
     pub duration_s: f64,

@@ -29,7 +29,7 @@ const SIZES: [f64; 2] = [0.02, 0.6];
 /// Times that a bump beyond the limits is halved before the trial is given up.
 const HALVINGS: usize = 3;
 
-/// What a search does not change.
+/// Inputs of a search, the same for all its starts.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SearchProblem<'a> {
     pub(super) situation: &'a Situation,

@@ -26,9 +26,9 @@ pub const PLAN_FRAME_PERIOD_S: f64 = ADVICE_DURATION_S / FRAMES as f64;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct WindowLayout {
     pub(super) count: usize,
-    /// Length of each, in seconds.
+    /// Length of each window, in seconds.
     pub(super) length_s: f64,
-    /// Frames of each.
+    /// Number of frames in each window.
     pub(super) frames: usize,
     /// Landmarks drawn in the view of each frame.
     pub(super) landmarks: usize,
