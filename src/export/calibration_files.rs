@@ -1,14 +1,13 @@
 //! Output files of `dcvins calibrate`.
 
-use std::fs;
 use std::path::Path;
 
 use super::calibration_report::CalibrationReport;
 use super::covariance::covariance_of_calibration;
 use super::error::ExportError;
+use super::folder_files::{remove_others, write_files};
 use super::masks;
 use super::trajectory::tum_of_calibration;
-use crate::flight_log::output::OutputSet;
 use crate::geometry::Dimension;
 use crate::session::CalibrationRun;
 
@@ -25,7 +24,6 @@ pub fn write_calibration(
     folder: &Path,
     trajectory: bool,
 ) -> Result<(), ExportError> {
-    fs::create_dir_all(folder).map_err(ExportError::write(folder))?;
     let json = serde_json::to_string_pretty(report)
         .map_err(|source| ExportError::Write { source: source.into(), path: folder.join("calibration.json") })?;
     let sigmas = report.parameters.iter().map(|it| (it.name.as_str(), it.dimension, it.sigma));
@@ -40,22 +38,9 @@ pub fn write_calibration(
         let texts = [tum_of_calibration(run), covariance_of_calibration(run)];
         files.extend(TRAJECTORY_FILES.into_iter().zip(texts));
     }
-    let mut outputs = OutputSet::default();
-    for (name, text) in files {
-        let path = folder.join(name);
-        outputs.write(&path, text.as_bytes()).map_err(ExportError::write(&path))?;
-    }
-    for (name, png) in masks {
-        let path = folder.join(name);
-        outputs.write(&path, &png).map_err(ExportError::write(&path))?;
-    }
-    outputs.commit().map_err(ExportError::commit)?;
-    for name in TRAJECTORY_FILES.into_iter().filter(|_| !trajectory) {
-        let path = folder.join(name);
-        if path.is_file() {
-            fs::remove_file(&path).map_err(ExportError::write(&path))?;
-        }
-    }
+    let texts = files.into_iter().map(|(name, text)| (name.to_owned(), text.into_bytes()));
+    let paths = write_files(texts.chain(masks), folder)?;
+    remove_others(&TRAJECTORY_FILES, &paths, folder)?;
     Ok(())
 }
 

@@ -10,6 +10,7 @@ pub(crate) mod existing;
 mod figure;
 pub(crate) mod file_hash;
 mod flight_noise;
+mod folder_files;
 pub(crate) mod masks;
 mod motion_csv;
 mod noise_files;

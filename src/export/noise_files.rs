@@ -1,12 +1,13 @@
 //! Noise of an IMU as files: the Allan deviation as a table and as a figure, and lines for a rig.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::error::ExportError;
 use super::flight_noise::FlightNoiseReport;
+#[cfg(feature = "gui")]
+use super::folder_files::figure_files;
+use super::folder_files::write_files;
 use crate::flight_log::csv_writer::{CsvWriter, number_cell};
-use crate::flight_log::output::OutputSet;
 use crate::log_check::AllanReport;
 
 const TABLE: &str = "allan.csv";
@@ -48,7 +49,7 @@ pub fn write_allan(report: &AllanReport, json: &str, folder: &Path) -> Result<Ve
         (REPORT, json.as_bytes().to_vec()),
     ];
     #[cfg(feature = "gui")]
-    let files = files.into_iter().chain(figures(report)).collect();
+    let files = files.into_iter().chain(figures(report));
     write_files(files, folder)
 }
 
@@ -60,32 +61,9 @@ pub fn write_flight_noise(report: &FlightNoiseReport, json: &str, folder: &Path)
     write_files(vec![(RIG_LINES, report.rig_lines().into_bytes()), (REPORT, json.as_bytes().to_vec())], folder)
 }
 
-fn write_files(files: Vec<(&str, Vec<u8>)>, folder: &Path) -> Result<Vec<PathBuf>, ExportError> {
-    fs::create_dir_all(folder).map_err(ExportError::write(folder))?;
-    let mut outputs = OutputSet::default();
-    let mut paths = Vec::new();
-    for (name, content) in files {
-        let path = folder.join(name);
-        outputs.write(&path, &content).map_err(ExportError::write(&path))?;
-        paths.push(path);
-    }
-    outputs.commit().map_err(ExportError::commit)?;
-    Ok(paths)
-}
-
-/// The figure, as pixels of the CPU painter and as a drawing.
 #[cfg(feature = "gui")]
 fn figures(report: &AllanReport) -> Vec<(&'static str, Vec<u8>)> {
-    use crate::gui::allan::allan_ui;
-    use crate::gui::rendering::headless::{self, HeadlessOptions};
-    use crate::gui::theme::{Theme, ThemeName};
-
-    let options = HeadlessOptions { size_px: [1920, 1040], pixels_per_point: 1.5, theme: ThemeName::Print };
-    let theme = Theme::of(options.theme);
-    let image = headless::draw(options, |ui| allan_ui(ui, &theme, report));
-    let drawing = headless::svg_of(options, "allan", "Allan deviation", |ui| allan_ui(ui, &theme, report));
-    let mut files = vec![(SVG, drawing.into_bytes())];
-    // Encoding an image of this size cannot fail.
-    files.extend(super::png_bytes(&image).ok().map(|png| (PNG, png)));
-    files
+    figure_files([PNG, SVG], [1920, 1040], ["allan", "Allan deviation"], |ui, theme| {
+        crate::gui::allan::allan_ui(ui, theme, report);
+    })
 }

@@ -1,13 +1,13 @@
 //! Files of a planned motion: `plan.json`, `plan.txt`, `sigma.csv` and, for a searched motion, `motion.csv`.
 
 use std::fmt::{self, Display, Formatter};
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
 use super::error::ExportError;
 use super::existing::read_index;
+use super::folder_files::{remove_others, write_files};
 use super::motion_csv::motion_csv;
 use crate::flight_log::csv_writer::{CsvWriter, number_cell};
 use crate::flight_log::{output, printable, shortened};
@@ -105,7 +105,6 @@ pub fn check_plan_folder(folder: &Path, rig: &str, force: bool) -> Result<(), Ex
 /// # Errors
 /// If the folder or a file cannot be written.
 pub fn write_plan(report: &PlanReport, joint_names: &[String], folder: &Path) -> Result<Vec<PathBuf>, ExportError> {
-    fs::create_dir_all(folder).map_err(ExportError::write(folder))?;
     let json = serde_json::to_string_pretty(report)
         .map_err(|source| ExportError::Write { source: source.into(), path: folder.join(INDEX) })?;
     let mut files = vec![
@@ -116,18 +115,8 @@ pub fn write_plan(report: &PlanReport, joint_names: &[String], folder: &Path) ->
     if let PlannedFlight::Motion(plan) = &report.plan {
         files.push((MOTION, motion_csv(&plan.motion, joint_names)));
     }
-    let mut outputs = output::OutputSet::default();
-    let mut paths = Vec::new();
-    for (name, text) in &files {
-        let path = folder.join(name);
-        outputs.write(&path, text.as_bytes()).map_err(ExportError::write(&path))?;
-        paths.push(path);
-    }
-    outputs.commit().map_err(ExportError::commit)?;
-    let motion = folder.join(MOTION);
-    if !paths.contains(&motion) && motion.is_file() {
-        fs::remove_file(&motion).map_err(ExportError::write(&motion))?;
-    }
+    let paths = write_files(files, folder)?;
+    remove_others(&[MOTION], &paths, folder)?;
     Ok(paths)
 }
 

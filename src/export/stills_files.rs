@@ -1,15 +1,16 @@
 //! Output files of `dcvins calibrate --stills`.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::calibration_files::sigmas_yaml;
 use super::error::ExportError;
+#[cfg(feature = "gui")]
+use super::folder_files::figure_files;
+use super::folder_files::{remove_others, write_files};
 use super::stills_report::StillsReport;
 use super::stills_rig::rig_of_stills;
 use crate::calibration::stills::StillsOutcome;
 use crate::flight_log::csv_writer::{CsvWriter, number_cell};
-use crate::flight_log::output::OutputSet;
 use crate::sensors::Stills;
 
 /// Names of all files; the first one names the stills.
@@ -30,7 +31,6 @@ pub(super) const STILLS_FILES: [&str; 9] = [
 /// # Errors
 /// If the folder or a file cannot be written.
 pub fn write_stills(stills: &Stills, report: &StillsReport, folder: &Path) -> Result<Vec<PathBuf>, ExportError> {
-    fs::create_dir_all(folder).map_err(ExportError::write(folder))?;
     let outcome = &report.outcome;
     let json = serde_json::to_string_pretty(report)
         .map_err(|source| ExportError::Write { source: source.into(), path: folder.join(STILLS_FILES[0]) })?;
@@ -52,20 +52,8 @@ pub fn write_stills(stills: &Stills, report: &StillsReport, folder: &Path) -> Re
     }
     #[cfg(feature = "gui")]
     files.extend(figures(outcome));
-    let mut outputs = OutputSet::default();
-    let mut paths = Vec::new();
-    for (name, content) in files {
-        let path = folder.join(name);
-        outputs.write(&path, &content).map_err(ExportError::write(&path))?;
-        paths.push(path);
-    }
-    outputs.commit().map_err(ExportError::commit)?;
-    // Files of an earlier calibration in the same folder that this one does not have.
-    for path in STILLS_FILES.map(|name| folder.join(name)).into_iter().filter(|path| !paths.contains(path)) {
-        if path.is_file() {
-            fs::remove_file(&path).map_err(ExportError::write(&path))?;
-        }
-    }
+    let paths = write_files(files, folder)?;
+    remove_others(&STILLS_FILES, &paths, folder)?;
     Ok(paths)
 }
 
@@ -172,19 +160,10 @@ fn correlations(outcome: &StillsOutcome) -> String {
     table.into_text()
 }
 
-/// The figure, as pixels of the CPU painter and as a drawing.
 #[cfg(feature = "gui")]
 fn figures(outcome: &StillsOutcome) -> Vec<(&'static str, Vec<u8>)> {
-    use crate::gui::rendering::headless::{self, HeadlessOptions};
-    use crate::gui::stills_figure::stills_ui;
-    use crate::gui::theme::{Theme, ThemeName};
-
-    let options = HeadlessOptions { size_px: [1920, 1140], pixels_per_point: 1.5, theme: ThemeName::Print };
-    let theme = Theme::of(options.theme);
-    let image = headless::draw(options, |ui| stills_ui(ui, &theme, outcome));
-    let drawing = headless::svg_of(options, "stills", "Calibration from stills", |ui| stills_ui(ui, &theme, outcome));
-    let mut files = vec![(STILLS_FILES[8], drawing.into_bytes())];
-    // Encoding an image of this size cannot fail.
-    files.extend(super::png_bytes(&image).ok().map(|png| (STILLS_FILES[7], png)));
-    files
+    let names = [STILLS_FILES[7], STILLS_FILES[8]];
+    figure_files(names, [1920, 1140], ["stills", "Calibration from stills"], |ui, theme| {
+        crate::gui::stills_figure::stills_ui(ui, theme, outcome);
+    })
 }
