@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use anyhow::Result;
 use clap::{Args, ValueEnum};
-use dcvins::flight_log::urdf::{CameraAxes, RobotModel};
+use dcvins::flight_log::urdf::RobotModel;
 use dcvins::flight_log::{FlightLog, log_name};
 use dcvins::interop::{
     Configuration, FixedJointAngles, OtherEstimator, calibrated_description, configure, robot_description,
@@ -16,6 +16,7 @@ use dcvins::text::{Entry, FINITE, Named as _};
 use serde::Serialize;
 
 use crate::cli::limit_arguments::LimitArguments;
+use crate::cli::robot_link_arguments::RobotLinkArguments;
 use crate::cli::terminal::{print, print_json};
 use crate::cli::value_parsers::seconds;
 
@@ -45,16 +46,8 @@ pub(crate) struct ExportArguments {
     /// With --to urdf: write the calibrated chain into this robot description. Only the origins of its joints change.
     #[arg(long, value_name = "FILE", requires = "imu_link", requires = "camera_link")]
     pub urdf: Option<PathBuf>,
-    /// Link of that robot description whose frame is that of the IMU.
-    #[arg(long, value_name = "LINK", requires = "urdf")]
-    pub imu_link: Option<String>,
-    /// Link of that robot description whose frame is that of the camera.
-    #[arg(long, value_name = "LINK", requires = "urdf")]
-    pub camera_link: Option<String>,
-    /// Axes of that link: optical (x right, y down, z forward) or flu (x forward, y left, z up) [default: optical if its name
-    /// contains "optical", else flu].
-    #[arg(long, value_name = "optical|flu", value_parser = camera_axes, requires = "urdf")]
-    pub camera_axes: Option<CameraAxes>,
+    #[command(flatten)]
+    pub links: RobotLinkArguments,
     /// Overwrite files that were not written by this command.
     #[arg(long)]
     pub force: bool,
@@ -145,7 +138,7 @@ fn description(arguments: &ExportArguments, rig: &Rig) -> Result<Configuration> 
     if arguments.at.is_some() || !arguments.joints.is_empty() {
         anyhow::bail!("a robot description has the joints themselves: leave --joints and --at out");
     }
-    let (Some(file), Some(imu), Some(link)) = (&arguments.urdf, &arguments.imu_link, &arguments.camera_link) else {
+    let (Some(file), Some((imu, link, axes))) = (&arguments.urdf, arguments.links.given()) else {
         return Ok(robot_description(rig, &arguments.cameras)?);
     };
     let camera = match arguments.cameras.as_slice() {
@@ -155,12 +148,8 @@ fn description(arguments: &ExportArguments, rig: &Rig) -> Result<Configuration> 
     };
     let camera = camera.ok_or_else(|| anyhow::anyhow!("the rig has no camera"))?;
     let model = RobotModel::read(file)?;
-    let path = model.path(imu, link, arguments.camera_axes.unwrap_or_else(|| CameraAxes::of_link(link)))?;
+    let path = model.path(imu, link, axes)?;
     Ok(calibrated_description(rig, camera, &path, &log_name(file))?)
-}
-
-fn camera_axes(text: &str) -> Result<CameraAxes, String> {
-    CameraAxes::from_name(text).ok_or_else(|| format!("expected {}", CameraAxes::alternatives()))
 }
 
 /// Writes the files and prints their paths and notes.

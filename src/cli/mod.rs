@@ -26,6 +26,7 @@ mod report;
 mod report_figures;
 mod result_cache;
 mod rig;
+mod robot_link_arguments;
 mod run;
 mod run_summary;
 #[cfg(feature = "gui")]

@@ -9,12 +9,13 @@ use dcvins::flight_log::FlightLog;
 use dcvins::flight_log::rig_template::{
     CameraChoice, DescribedChain, MechanismAxes, PublishedCamera, RigChoices, RigTemplate,
 };
-use dcvins::flight_log::urdf::{CameraAxes, RobotModel};
+use dcvins::flight_log::urdf::RobotModel;
 use dcvins::sensors::BodyAxes;
 use dcvins::text::{Entry, Named as _};
 
 use crate::cli::exit::{self, ExitOutcome};
 use crate::cli::limit_arguments::LimitArguments;
+use crate::cli::robot_link_arguments::RobotLinkArguments;
 use crate::cli::terminal::print;
 use crate::cli::value_parsers::sides;
 
@@ -44,16 +45,8 @@ pub(crate) struct NewArguments {
     /// log, as in `topic:/robot_description`. Rotating, mimicking and fixed joints between the links are taken, with their limits.
     #[arg(long, value_name = "FILE", requires = "imu_link", requires = "camera_link", conflicts_with_all = ["mechanism", "at", "positive", "joints"])]
     pub urdf: Option<PathBuf>,
-    /// Link of the robot description whose frame is that of the IMU.
-    #[arg(long, value_name = "LINK", requires = "urdf")]
-    pub imu_link: Option<String>,
-    /// Link of the robot description whose frame is that of the camera.
-    #[arg(long, value_name = "LINK", requires = "urdf")]
-    pub camera_link: Option<String>,
-    /// Axes of that link: optical (x right, y down, z forward) or flu (x forward, y left, z up) [default: optical if its name
-    /// contains "optical", else flu].
-    #[arg(long, value_name = "optical|flu", value_parser = camera_axes, requires = "urdf")]
-    pub camera_axes: Option<CameraAxes>,
+    #[command(flatten)]
+    pub links: RobotLinkArguments,
     /// The camera: fov:DEG (horizontal field of view), a model with published intrinsics (--list prints all), or
     /// info[:TOPIC] for the log's `CameraInfo`.
     #[arg(long, value_name = "CAMERA", value_parser = parsed::<CameraChoice>, required_unless_present = "list")]
@@ -157,13 +150,9 @@ fn attitude(text: &str) -> Result<Attitude, String> {
         .ok_or_else(|| format!("expected a topic and entries {}=VALUE between commas", KEYS.join("=VALUE, ")))
 }
 
-fn camera_axes(text: &str) -> Result<CameraAxes, String> {
-    CameraAxes::from_name(text).ok_or_else(|| format!("expected {}", CameraAxes::alternatives()))
-}
-
 /// Chain of `--urdf`.
 fn described_chain(arguments: &NewArguments, log: Option<&FlightLog>) -> Result<Option<DescribedChain>> {
-    let (Some(urdf), Some(imu), Some(camera)) = (&arguments.urdf, &arguments.imu_link, &arguments.camera_link) else {
+    let (Some(urdf), Some((imu, camera, axes))) = (&arguments.urdf, arguments.links.given()) else {
         return Ok(None);
     };
     let model = match (urdf.to_str().and_then(|text| text.strip_prefix("topic:")), log) {
@@ -171,9 +160,8 @@ fn described_chain(arguments: &NewArguments, log: Option<&FlightLog>) -> Result<
         (Some(topic), None) => bail!("--urdf topic:{topic} needs a log"),
         (None, _) => RobotModel::read(urdf)?,
     };
-    let axes = arguments.camera_axes.unwrap_or_else(|| CameraAxes::of_link(camera));
     let path = model.path(imu, camera, axes)?;
-    Ok(Some(path.described(arguments.camera_axes.is_some())))
+    Ok(Some(path.described(arguments.links.camera_axes.is_some())))
 }
 
 pub(crate) fn rig(arguments: &RigArguments) -> Result<ExitOutcome> {
