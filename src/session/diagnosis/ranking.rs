@@ -57,6 +57,11 @@ pub(super) fn score(hypothesis: &TrialHypothesis, misfit: &Misfit, given: &Misfi
     cost + 2.0 * scale.windows * noise + hypothesis.parameters as f64 * observations.ln()
 }
 
+/// Trial with the lowest score, `None` without trials.
+pub(super) fn best<'a>(trials: impl IntoIterator<Item = &'a RankedTrial>) -> Option<&'a RankedTrial> {
+    trials.into_iter().min_by(|one, other| one.score.total_cmp(&other.score))
+}
+
 /// The best candidate of each cause, the best cause first; a special case that is about as good precedes the general
 /// cause.
 pub(super) fn by_cause(given: &RankedTrial, mut candidates: Vec<RankedTrial>) -> Vec<RankedTrial> {

@@ -1,7 +1,7 @@
 //! Values of causes from the trials so far: better hypotheses of the same kinds.
 
 use super::hypotheses::{Cause, TrialHypothesis};
-use super::ranking::RankedTrial;
+use super::ranking::{RankedTrial, best};
 use super::trial::{DiagnosedRun, TrialResult};
 use super::tuning::rounded;
 use crate::estimator::SensorParameters;
@@ -33,7 +33,7 @@ pub(super) fn refined(run: &DiagnosedRun<'_>, candidates: &[RankedTrial]) -> Vec
     }
     let best_of = |cause: Cause| {
         let of_cause = candidates.iter().filter(|it| it.hypothesis.cause == cause && it.hypothesis.from.is_none());
-        of_cause.min_by(|one, other| one.score.total_cmp(&other.score))
+        best(of_cause)
     };
     if let Some(best) = best_of(Cause::Focal).filter(|_| run.spec.calibrate && !run.spec.intrinsics) {
         // The columns of the intrinsics find the rest of the error from here; the result is refined once more.

@@ -1,7 +1,7 @@
 //! Values and steps around those of the best trials.
 
 use super::hypotheses::{Cause, TrialHypothesis};
-use super::ranking::RankedTrial;
+use super::ranking::{RankedTrial, best};
 use super::scoring::Trials;
 use crate::session::plan::MeasurementCorrection;
 
@@ -14,7 +14,7 @@ const SPREAD_S: [f64; 2] = [0.6, 1.6];
 /// The best change that begins at a step, at other steps around it.
 pub(super) fn moved(trials: &Trials) -> Vec<TrialHypothesis> {
     let later = trials.others.iter().filter(|it| it.hypothesis.from.is_some());
-    let Some(best) = later.min_by(|one, other| one.score.total_cmp(&other.score)) else { return Vec::new() };
+    let Some(best) = best(later) else { return Vec::new() };
     let hypothesis = &best.hypothesis;
     let steps = MOVES.map(|by| hypothesis.from.and_then(|from| from.checked_add_signed(by)));
     steps.into_iter().flatten().map(|step| TrialHypothesis { from: Some(step), ..hypothesis.clone() }).collect()
@@ -25,7 +25,7 @@ pub(super) fn tuned(candidates: &[RankedTrial]) -> Vec<TrialHypothesis> {
     let mut all = Vec::new();
     for cause in [Cause::JointOffset, Cause::Zoom] {
         let of_cause = candidates.iter().filter(|it| it.hypothesis.cause == cause);
-        let Some(best) = of_cause.min_by(|one, other| one.score.total_cmp(&other.score)) else { continue };
+        let Some(best) = best(of_cause) else { continue };
         let hypothesis = &best.hypothesis;
         let with = |correction: MeasurementCorrection| {
             let mut changed = hypothesis.clone();

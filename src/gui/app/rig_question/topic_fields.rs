@@ -2,6 +2,7 @@
 
 use egui::{ComboBox, Ui};
 
+use crate::flight_log::attitude::VEHICLE_KINDS;
 use crate::flight_log::{FlightLog, MessageKind, TopicInfo};
 use crate::sensors::{AngleUnit, AttitudeFrame, BodyAxes};
 use crate::text::Named as _;
@@ -13,15 +14,6 @@ const ATTITUDES: [MessageKind; 5] = [
     MessageKind::Vector3Stamped,
     MessageKind::MavrosGimbalAttitude,
     MessageKind::Px4GimbalAttitude,
-];
-/// Topics with the attitude of the vehicle.
-const VEHICLES: [MessageKind; 6] = [
-    MessageKind::QuaternionStamped,
-    MessageKind::PoseStamped,
-    MessageKind::Odometry,
-    MessageKind::TransformStamped,
-    MessageKind::Imu,
-    MessageKind::Px4VehicleAttitude,
 ];
 /// Order of Euler angles at first: the fields z, x, y of DJI are yaw, roll and pitch.
 const USUAL_ORDER: &str = "yaw=z roll=x pitch=y";
@@ -79,7 +71,7 @@ impl TopicFields {
             AngleField::Attitude(topic, _) => of_gimbal(topic),
         });
         let (imus, images) = (log.topics_of(&[MessageKind::Imu]), log.topics_of(&MessageKind::IMAGES));
-        let vehicles: Vec<String> = VEHICLES.iter().flat_map(|kind| log.topics_of(&[*kind])).collect();
+        let vehicles: Vec<String> = VEHICLE_KINDS.iter().flat_map(|kind| log.topics_of(&[*kind])).collect();
         let first_of_gimbal = images.iter().find(|topic| of_gimbal(topic)).or_else(|| images.first());
         Self {
             imu: imus.first().cloned().filter(|_| imus.len() > 1 && !are_halves(&imus)),
