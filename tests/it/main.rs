@@ -17,6 +17,7 @@ mod outputs;
 #[cfg(feature = "gui")]
 mod pictures;
 mod plan;
+mod python;
 #[cfg(feature = "gui")]
 mod renderers;
 mod report;
