@@ -40,6 +40,9 @@ pub fn rig_with_source(source: &str) -> String {
     RIG.replace("rostopic: /gimbal/joint_states", &format!("source: {source}"))
 }
 
+/// Videos of gimbal cameras.
+#[path = "../../tests/it/convert/gimbal_recorders.rs"]
+mod gimbal_recorders;
 /// Recordings of autopilots and cameras.
 #[path = "../../tests/it/convert/recorders.rs"]
 mod recorders;
@@ -196,9 +199,28 @@ pub fn recordings() -> Vec<(&'static str, &'static str, Vec<u8>)> {
         ("tlog", "flight", recorders::telemetry_log(30)),
         ("movie", "tables-first", recorders::movie(&[video(), track("ZXY")], true)),
         ("movie", "tables-last", recorders::movie(&[track("YxZ"), video()], false)),
+        ("movie", "fragments", gimbal_recorders::fragmented(&video())),
+        ("movie", "gimbal", gimbal_video()),
+        ("dataflash", "gimbal", gimbal_recorders::camera_log(5, [0.5, -30.0, 12.5])),
         ("gpmf", "camera", payload),
         ("gpmf", "receiver", receiver()),
     ]
+}
+
+/// MP4 video with every telemetry of a gimbal camera: a message in its frame, a subtitle and packets of its motion.
+fn gimbal_video() -> Vec<u8> {
+    let mut video = recorders::video_track(&[KEYFRAME], [96, 64]);
+    let message = r#"{"schema":"apcg.telemetry.v1","utc_us":1717977600000000,"hfov_deg":71.5,
+        "position":{"lat_e7":470000000,"lon_e7":80000000,"alt_amsl_m":500.0,"age_ms":5},
+        "vehicle_attitude":{"roll_rad":0.02,"pitch_rad":-0.05,"yaw_rad":1.5,"age_ms":12},
+        "gimbal_attitude":{"roll_rad":0.0,"pitch_rad":-0.5,"yaw_rad":0.1,"age_ms":30}}"#;
+    gimbal_recorders::with_message(&mut video.samples[0], message);
+    let subtitle = "2026-05-01_10-11-12 stream->FrameCnt:0 \nlatitude:N47°0′0″, longitude:E8°0′0″\nabs_alt:500\n\
+                    gb_yaw:1, gb_pitch:-30, gb_roll:0\nmix_ratio:1";
+    let packets: Vec<(u16, Vec<u8>)> = (0..8).map(|kind| (kind, vec![0x40; 56])).collect();
+    let tracks =
+        [video, gimbal_recorders::subtitle_track(&[subtitle.to_owned()]), gimbal_recorders::motion_track(&packets)];
+    recorders::movie(&tracks, true)
 }
 
 /// GPMF payload of a camera with a satellite receiver and of a Karma drone.

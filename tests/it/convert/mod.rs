@@ -3,6 +3,8 @@
 
 mod damage;
 mod euroc;
+mod gimbal_recorders;
+mod gimbal_videos;
 mod recorders;
 mod recordings;
 mod ros1;

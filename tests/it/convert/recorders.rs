@@ -205,6 +205,7 @@ pub(crate) fn telemetry_log(samples: usize) -> Vec<u8> {
 }
 
 /// A track of a movie.
+#[derive(Clone, Debug)]
 pub(crate) struct Track<'a> {
     /// Handler, `vide` or `meta`.
     pub(crate) handler: &'a [u8; 4],

@@ -1,7 +1,8 @@
-//! Recordings of vehicles: an MP4 video with `GoPro`'s telemetry or with an autopilot's log, and autopilots' logs
-//! alone.
+//! Recordings of vehicles: an MP4 video with telemetry in it or with an autopilot's log, and autopilots' logs alone.
 
 mod attitude;
+mod camera_gimbal;
+mod camm;
 mod candidates;
 mod damage;
 mod dataflash;
@@ -11,6 +12,8 @@ mod mp4;
 mod recorded;
 mod rig;
 mod scalar;
+mod siyi;
+mod telemetry;
 mod tlog;
 mod topics;
 mod ulog;
@@ -26,6 +29,7 @@ use crate::geometry::{ns_from_seconds, seconds_from_ns};
 use mp4::Movie;
 use recorded::Recorded;
 pub(super) use rig::VideoFacts;
+use telemetry::VideoTelemetry;
 use topics::Topics;
 
 /// Kind of an autopilot's log by the first bytes of the file.
@@ -96,12 +100,15 @@ pub(super) fn convert_video(
     options: &ConvertOptions,
     sink: &mut LogSink<'_>,
 ) -> Result<VideoFacts, ConvertError> {
-    let Movie { video, telemetry, created_ns, firmware, notes } = mp4::open(source, &options.limits)?;
+    let movie = mp4::open(source, &options.limits)?;
+    let telemetry = telemetry::read(&movie);
+    let VideoTelemetry { mut camera, drone, gimbal, field_of_view, horizontal_deg, has_unknown_axes } = telemetry;
+    let Movie { video, created_ns, firmware, notes, .. } = movie;
     for note in notes {
         sink.note(note);
     }
-    let gpmf::Telemetry { mut camera, drone, field_of_view } = gpmf::read(&telemetry);
-    let video_utc_ns = camera.utc_offset_ns().or_else(|| drone.as_ref().and_then(Recorded::utc_offset_ns));
+    let recorders = [Some(&camera), drone.as_ref(), gimbal.as_ref()];
+    let video_utc_ns = recorders.into_iter().flatten().find_map(Recorded::utc_offset_ns);
     let mut topics = Topics::default();
     let place = if let Some(log) = &options.autopilot {
         let mut recorded = read_autopilot(log, sink)?;
@@ -111,6 +118,10 @@ pub(super) fn convert_video(
             let count = drone.count();
             sink.leave("Karma", "GoPro Karma", count, "the autopilot's log is read instead");
         }
+        if let Some(mut gimbal) = gimbal {
+            gimbal.map_times(|time_ns| place.time_ns(time_ns));
+            recorded.append(gimbal);
+        }
         topics.add_recorded(recorded, sink);
         place
     } else {
@@ -118,9 +129,16 @@ pub(super) fn convert_video(
         if video_utc_ns.is_none() && created_ns.is_none() {
             sink.note("the camera recorded no time: the video starts 1 s after the epoch");
         }
-        if let Some(mut drone) = drone {
-            drone.shift(start_ns);
-            topics.add_recorded(drone, sink);
+        let vehicle = match (drone, gimbal) {
+            (Some(mut drone), Some(gimbal)) => {
+                drone.append(gimbal);
+                Some(drone)
+            }
+            (drone, gimbal) => drone.or(gimbal),
+        };
+        if let Some(mut vehicle) = vehicle {
+            vehicle.shift(start_ns);
+            topics.add_recorded(vehicle, sink);
         }
         Place { start_ns, rate: 1.0 }
     };
@@ -131,6 +149,8 @@ pub(super) fn convert_video(
         resolution_px: video.resolution_px,
         firmware,
         field_of_view,
+        horizontal_deg,
+        has_unknown_axes,
         gimbal_frame: topics.gimbal_frame,
         has_autopilot: options.autopilot.is_some(),
     };

@@ -29,6 +29,10 @@ pub(in super::super) struct VideoFacts {
     /// Version of a `GoPro`'s firmware, and the letter of its field of view.
     pub(super) firmware: Option<String>,
     pub(super) field_of_view: Option<String>,
+    /// Recorded horizontal field of view in degrees.
+    pub(super) horizontal_deg: Option<f64>,
+    /// True for an IMU of the camera whose axes are not known.
+    pub(super) has_unknown_axes: bool,
     /// Frame of the gimbal's attitude, `None` if it was not recorded.
     pub(super) gimbal_frame: Option<GimbalFrame>,
     /// True for the IMU of an autopilot.
@@ -36,9 +40,9 @@ pub(in super::super) struct VideoFacts {
 }
 
 impl VideoFacts {
-    /// Published camera, else the usual field of view.
+    /// Published camera, else the recorded field of view, else the usual one.
     fn camera(&self) -> CameraChoice {
-        let usual = CameraChoice::FieldOfView(USUAL_FIELD_OF_VIEW_DEG);
+        let usual = CameraChoice::FieldOfView(self.horizontal_deg.unwrap_or(USUAL_FIELD_OF_VIEW_DEG));
         let Some(firmware) = &self.firmware else { return usual };
         let Some((_, model)) = FIRMWARES.into_iter().find(|(start, _)| firmware.starts_with(start)) else {
             return usual;
@@ -86,7 +90,7 @@ impl VideoFacts {
             mechanism: mechanism.parse::<MechanismAxes>()?,
             described: None,
             positive: Some(frd),
-            imu_axes: Some(if self.has_autopilot { frd } else { flu }),
+            imu_axes: if self.has_autopilot { Some(frd) } else { (!self.has_unknown_axes).then_some(flu) },
             position_m: None,
             imu_topic: imu,
             image_topic: Some(VIDEO_TOPIC.to_owned()),

@@ -39,7 +39,10 @@ fn take(record: &Record<'_>, recorded: &mut Recorded) {
         "ATT" | "AHR2" => attitude(record, name, u8::from(name == "AHR2"), recorded),
         "XKF1" | "NKF1" | "EKF1" => position(record, name, recorded),
         "GPS" => fix(record, recorded),
+        "POS" => camera_position(record, recorded),
         "MNT" => mount(record, recorded),
+        "GIMB" => camera_gimbal(record, recorded),
+        "TIME" => camera_time(record, recorded),
         "FMTU" | "UNIT" | "MULT" => Ok(()),
         _ => Err("not read"),
     };
@@ -156,7 +159,7 @@ const GPS_EPOCH_S: f64 = 315_964_800.0;
 const LEAP_SECONDS: [(f64, f64); 3] = [(1_025_136_016.0, 16.0), (1_119_744_017.0, 17.0), (1_167_264_018.0, 18.0)];
 
 /// Converts a GPS week and its milliseconds to UTC in nanoseconds since the epoch.
-fn utc_from_gps_ns(week: f64, milliseconds: f64) -> Option<i64> {
+pub(super) fn utc_from_gps_ns(week: f64, milliseconds: f64) -> Option<i64> {
     let gps_s = week * 604_800.0 + milliseconds * 1e-3;
     let leap_s = LEAP_SECONDS.iter().rev().find(|(from_s, _)| gps_s >= *from_s)?.1;
     nanoseconds(GPS_EPOCH_S + week * 604_800.0 + milliseconds * 1e-3 - leap_s, 1e9)
@@ -179,5 +182,37 @@ fn mount(record: &Record<'_>, recorded: &mut Recorded) -> Result<(), &'static st
     let frame_from_camera: UnitQuaternion<f64> =
         from_euler([roll_deg, pitch_deg, yaw_deg].map(f64::to_radians)).ok_or(NOT_FINITE)?;
     recorded.gimbal.push((0, gimbal), &gimbal_name, time_ns(record)?, GimbalAttitude { frame, frame_from_camera });
+    Ok(())
+}
+
+/// Reads the angles in the log of `AP_CameraGimbal`: roll and pitch from the horizon, yaw from the vehicle, in degrees, at
+/// the time of their measurement.
+fn camera_gimbal(record: &Record<'_>, recorded: &mut Recorded) -> Result<(), &'static str> {
+    let angles_deg = record.numbers(["Roll", "Pitch", "Yaw"]).ok_or("without measured angles")?;
+    let frame_from_camera = from_euler(angles_deg.map(f64::to_radians)).ok_or(NOT_FINITE)?;
+    let sampled = record.raw("SampleUS").filter(|time| *time > 0.0).and_then(|time| nanoseconds(time, 1e3));
+    let time_ns = sampled.map_or_else(|| time_ns(record), Ok)?;
+    let attitude = GimbalAttitude { frame: GimbalFrame::Vehicle, frame_from_camera };
+    recorded.gimbal.push((1, 0), "GIMB", time_ns, attitude);
+    Ok(())
+}
+
+/// Reads the vehicle's position in the log of `AP_CameraGimbal`, which has no records of a receiver.
+fn camera_position(record: &Record<'_>, recorded: &mut Recorded) -> Result<(), &'static str> {
+    // Positions of an autopilot's own log are those of its receiver and of its filter.
+    if record.raw("BootMS").is_none() {
+        return Err("not read");
+    }
+    let [latitude_deg, longitude_deg, altitude_m] =
+        record.numbers(["Lat", "Lng", "Alt"]).ok_or("without a position")?;
+    let fix = Geodetic::from_deg(latitude_deg, longitude_deg, altitude_m).ok_or("without a position")?;
+    recorded.fixes.push((1, 0), "POS", time_ns(record)?, fix);
+    Ok(())
+}
+
+/// Reads UTC in the log of `AP_CameraGimbal`, in microseconds since the epoch.
+fn camera_time(record: &Record<'_>, recorded: &mut Recorded) -> Result<(), &'static str> {
+    let utc_ns = record.raw("UTC").and_then(|microseconds| nanoseconds(microseconds, 1e3)).ok_or("without UTC")?;
+    recorded.utc.push((time_ns(record)?, utc_ns));
     Ok(())
 }

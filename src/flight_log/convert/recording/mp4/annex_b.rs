@@ -55,19 +55,32 @@ impl UnitFormat {
         Some(Self { codec: VideoCodec::H265, length_bytes, parameter_sets })
     }
 
+    /// Units of a sample without their length prefixes; the last one is an error if the sample ends within it.
+    pub(super) fn units<'a>(&self, sample: &'a [u8]) -> impl Iterator<Item = Result<&'a [u8], String>> {
+        let length_bytes = self.length_bytes;
+        let mut rest = sample;
+        std::iter::from_fn(move || {
+            while !rest.is_empty() {
+                let unit = rest.split_at_checked(length_bytes).and_then(|(length, behind)| {
+                    let length = length.iter().fold(0_usize, |length, byte| length << 8 | usize::from(*byte));
+                    behind.split_at_checked(length)
+                });
+                let Some((unit, behind)) = unit else {
+                    rest = &[];
+                    return Some(Err(damaged()));
+                };
+                rest = behind;
+                if !unit.is_empty() {
+                    return Some(Ok(unit));
+                }
+            }
+            None
+        })
+    }
+
     /// Converts a sample to a byte stream; a keyframe without parameter sets gets them.
     pub(super) fn access_unit(&self, sample: &[u8]) -> Result<Vec<u8>, String> {
-        let mut units = Vec::new();
-        let mut rest = sample;
-        while !rest.is_empty() {
-            let (length, behind) = rest.split_at_checked(self.length_bytes).ok_or_else(damaged)?;
-            let length = length.iter().fold(0_usize, |length, byte| length << 8 | usize::from(*byte));
-            let (unit, behind) = behind.split_at_checked(length).ok_or_else(damaged)?;
-            if !unit.is_empty() {
-                units.push(unit);
-            }
-            rest = behind;
-        }
+        let units = self.units(sample).collect::<Result<Vec<&[u8]>, String>>()?;
         let kinds: Vec<UnitKind> = units.iter().map(|unit| self.kind(unit[0])).collect();
         let needs_sets = kinds.contains(&UnitKind::RandomAccess) && !kinds.contains(&UnitKind::ParameterSet);
         let mut out = Vec::with_capacity(sample.len() + self.parameter_sets.len() + 4 * units.len());

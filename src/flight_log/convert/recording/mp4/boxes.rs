@@ -4,13 +4,15 @@ use super::super::super::super::file::{FileWindow, LogFile};
 
 /// Size of the header: size and type.
 const HEADER_BYTES: usize = 8;
-/// Largest number of boxes per level.
-const MAX_BOXES: usize = 65_536;
+/// Largest number of boxes of the first level: fragments of one frame each for nine hours.
+const MAX_BOXES: usize = 2_097_152;
 
 /// Box of the file's first level.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct FileBox {
     pub(super) kind: [u8; 4],
+    /// Start of the header.
+    pub(super) at: usize,
     /// Start of the content, which may end beyond the file.
     pub(super) start: usize,
     pub(super) end: usize,
@@ -39,7 +41,7 @@ pub(super) fn file_boxes(file: &LogFile) -> Result<Vec<FileBox>, String> {
         if end < start || !kind.iter().all(|byte| (0x20..0x7F).contains(byte) || *byte == 0xA9) {
             break;
         }
-        boxes.push(FileBox { kind, start, end });
+        boxes.push(FileBox { kind, at, start, end });
         at = end;
     }
     Ok(boxes)

@@ -1,7 +1,9 @@
-//! MP4 files: the frames of their video with their times, and the payloads of their telemetry.
+//! MP4 files, also fragmented ones: the frames of their video with their times, and the payloads of their telemetry.
 
 mod annex_b;
 mod boxes;
+mod fragments;
+mod sei;
 mod track;
 
 use std::path::Path;
@@ -13,11 +15,18 @@ use super::super::ConvertError;
 use super::candidates::Samples;
 use super::recorded::rate_hz;
 use annex_b::UnitFormat;
-use boxes::{child, children, descendant, file_boxes, u32_at, u64_at};
+use boxes::{FileBox, child, children, descendant, file_boxes, u32_at, u64_at};
+use fragments::Fragments;
+use sei::{SeiUnit, sei_unit, unregistered};
 use track::{MovieTrack, Sample};
 
 /// Seconds from 1904, the origin of MP4 times, to the epoch.
 const EPOCH_1904_S: u64 = 2_082_844_800;
+
+/// Number of frames without a message of users after which none is expected.
+const SEARCHED_FRAMES: usize = 300;
+/// Number of bytes at the start of a frame in which messages of users are searched: they come before the picture.
+const SEARCHED_BYTES: usize = 16_384;
 
 /// Frame of a video.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,6 +64,10 @@ pub(super) struct Movie {
     pub(super) video: Video,
     /// `GoPro` telemetry.
     pub(super) telemetry: Vec<Payload>,
+    /// Camera motion metadata (CAMM).
+    pub(super) motion: Vec<Payload>,
+    /// Subtitles (`tx3g`).
+    pub(super) subtitles: Vec<Payload>,
     /// Start of the recording by the camera's clock, in nanoseconds since the epoch.
     pub(super) created_ns: Option<i64>,
     /// Version of a `GoPro`'s firmware.
@@ -74,7 +87,6 @@ pub(super) fn open(path: &Path, limits: &LogLimits) -> Result<Movie, ConvertErro
     let file = LogFile::open(path, limits)?;
     let unreadable = |problem: String| ConvertError::unreadable(problem, path);
     let found = file_boxes(&file).map_err(unreadable)?;
-    let has = |kind: &[u8; 4]| found.iter().any(|found| &found.kind == kind);
     let Some(moov) = found.iter().find(|found| &found.kind == b"moov") else {
         return Err(unreadable(
             "the MP4 has no moov box, the table of its frames: the recording was not closed (power lost, card removed) or \
@@ -83,13 +95,6 @@ pub(super) fn open(path: &Path, limits: &LogLimits) -> Result<Movie, ConvertErro
                 .to_owned(),
         ));
     };
-    if has(b"moof") {
-        return Err(unreadable(
-            "a fragmented MP4 (moof boxes) is not read; rewrite it with \
-             'ffmpeg -i IN.mp4 -map 0 -c copy -copy_unknown OUT.mp4'"
-                .to_owned(),
-        ));
-    }
     let table = file.read(moov.start..moov.end).map_err(|problem| unreadable(format!("the moov box: {problem}")))?;
     let mut notes = Vec::new();
     let header = child(&table, b"mvhd").unwrap_or_default();
@@ -102,9 +107,12 @@ pub(super) fn open(path: &Path, limits: &LogLimits) -> Result<Movie, ConvertErro
     let firmware = descendant(&table, &[b"udta", b"FIRM"]).map(|text| String::from_utf8_lossy(text).into_owned());
     let max_samples = limits.messages(file.len() as u64);
     let traks = children(&table).filter(|(kind, _)| kind == b"trak");
-    let tracks: Vec<MovieTrack<'_>> =
+    let mut tracks: Vec<MovieTrack<'_>> =
         traks.filter_map(|(_, trak)| track::read(trak, movie_timescale.unwrap_or(1), max_samples)).collect();
-    let telemetry = telemetry(&tracks, &file, &mut notes);
+    add_fragments(&file, &found, &table, &mut tracks, max_samples, &mut notes).map_err(unreadable)?;
+    let [telemetry, motion, subtitles] =
+        [(b"gpmd", "telemetry"), (b"camm", "camera motion metadata"), (b"tx3g", "subtitles")]
+            .map(|(kind, name)| payloads(&tracks, kind, name, &file, &mut notes));
     let (track, format, resolution_px) = video_track(&tracks).map_err(unreadable)?;
     let (pictures, has_reordered_pictures) = pictures(track, file.len(), &mut notes);
     if pictures.is_empty() {
@@ -119,7 +127,7 @@ pub(super) fn open(path: &Path, limits: &LogLimits) -> Result<Movie, ConvertErro
     let codec = format.codec;
     let video = Video { file, format, codec, resolution_px, pictures, has_reordered_pictures };
     let created_ns = created_s.and_then(|created_s| created_s.checked_mul(1_000_000_000));
-    Ok(Movie { video, telemetry, created_ns, firmware, notes })
+    Ok(Movie { video, telemetry, motion, subtitles, created_ns, firmware, notes })
 }
 
 /// The first video track that can be read, how its units are stored, and its resolution.
@@ -184,9 +192,40 @@ fn place(sample: &Sample, file_bytes: usize) -> Option<(usize, usize)> {
     (length > 0 && start.checked_add(length)? <= file_bytes).then_some((start, length))
 }
 
-/// The payloads of `GoPro`'s telemetry.
-fn telemetry(tracks: &[MovieTrack<'_>], file: &LogFile, notes: &mut Vec<String>) -> Vec<Payload> {
-    let Some(track) = tracks.iter().find(|track| &track.description.0 == b"gpmd") else { return Vec::new() };
+/// Adds the samples of the fragments to those of the tables.
+fn add_fragments(
+    file: &LogFile,
+    boxes: &[FileBox],
+    moov: &[u8],
+    tracks: &mut [MovieTrack<'_>],
+    max_samples: u64,
+    notes: &mut Vec<String>,
+) -> Result<(), String> {
+    let Some(mut fragments) = Fragments::new(moov, tracks, max_samples) else { return Ok(()) };
+    for fragment in boxes.iter().filter(|found| &found.kind == b"moof") {
+        // A recording that was not closed ends within a fragment.
+        if fragment.end > file.len() {
+            notes.push("the last fragment is incomplete (power lost, or the copy is incomplete)".to_owned());
+            continue;
+        }
+        let content = file.read(fragment.start..fragment.end).map_err(|problem| format!("a moof box: {problem}"))?;
+        fragments.add(&content, fragment.at as u64, tracks);
+    }
+    if fragments.undescribed > 0 {
+        notes.push(format!("{} samples or fragments are damaged, or more than the limit", fragments.undescribed));
+    }
+    Ok(())
+}
+
+/// The payloads of the first track with a type of description.
+fn payloads(
+    tracks: &[MovieTrack<'_>],
+    kind: &[u8; 4],
+    name: &str,
+    file: &LogFile,
+    notes: &mut Vec<String>,
+) -> Vec<Payload> {
+    let Some(track) = tracks.iter().find(|track| &track.description.0 == kind) else { return Vec::new() };
     let mut payloads = Vec::new();
     let mut lost = track.undescribed;
     // Together they cannot be longer than the file.
@@ -206,7 +245,7 @@ fn telemetry(tracks: &[MovieTrack<'_>], file: &LogFile, notes: &mut Vec<String>)
         }
     }
     if lost > 0 {
-        notes.push(format!("{lost} payloads of telemetry are lost: beyond the end of the file (truncated)"));
+        notes.push(format!("{lost} payloads of {name} are lost: beyond the end of the file (truncated)"));
     }
     payloads
 }
@@ -216,6 +255,31 @@ impl Video {
     pub(super) fn access_unit(&self, number: usize) -> Result<Vec<u8>, String> {
         let Picture { start, length, .. } = self.pictures[number];
         self.format.access_unit(&self.file.read(start..start + length)?)
+    }
+
+    /// Calls a function with the time and the content of every message of users with an identifier
+    /// (`user_data_unregistered`), in the order of the frames; the search ends after many frames without one.
+    pub(super) fn each_message(&self, uuid: [u8; 16], mut take: impl FnMut(i64, &[u8])) {
+        let mut found = 0_usize;
+        for (number, picture) in self.pictures.iter().enumerate() {
+            if found == 0 && number >= SEARCHED_FRAMES {
+                return;
+            }
+            let length = picture.length.min(SEARCHED_BYTES);
+            let Ok(start) = self.file.read(picture.start..picture.start + length) else { continue };
+            for unit in self.format.units(&start).map_while(Result::ok) {
+                match sei_unit(self.codec, unit[0]) {
+                    SeiUnit::Messages { header_bytes } => {
+                        for content in unregistered(unit, header_bytes, uuid) {
+                            found += 1;
+                            take(picture.presented_ns, &content);
+                        }
+                    }
+                    SeiUnit::Picture => break,
+                    SeiUnit::Other => {}
+                }
+            }
+        }
     }
 
     /// Description such as `h264, 854×480, 29.97 fps`.

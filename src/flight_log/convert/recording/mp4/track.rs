@@ -14,8 +14,32 @@ pub(super) struct Sample {
     pub(super) duration_ns: i64,
 }
 
+/// Relation of a track's times to those of the movie.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct TrackClock {
+    /// Units per second.
+    timescale: i128,
+    /// First displayed time in these units.
+    media_start: i64,
+    /// Delay of the track in the movie.
+    delay_ns: i64,
+}
+
+impl TrackClock {
+    /// Converts a time of the track to nanoseconds since the start of the movie.
+    pub(super) fn in_ns(self, units: i64) -> Option<i64> {
+        let time_ns = i128::from(units.saturating_sub(self.media_start)) * 1_000_000_000 / self.timescale;
+        i64::try_from(time_ns).ok()?.checked_add(self.delay_ns)
+    }
+}
+
 #[derive(Clone, Debug)]
 pub(super) struct MovieTrack<'a> {
+    /// Number of the track, 0 without a header.
+    pub(super) id: u32,
+    pub(super) clock: TrackClock,
+    /// Decoding time behind the last sample of the tables, in units of the track.
+    pub(super) end: u64,
     /// Such as `vide`, `soun`, `meta`.
     pub(super) handler: [u8; 4],
     /// Type and content of the first sample description.
@@ -36,7 +60,6 @@ pub(super) fn read(trak: &[u8], movie_timescale: u32, max_samples: u64) -> Optio
     let header = child(media, b"mdhd")?;
     // Version 1 has times of 64 bits.
     let timescale = if header.first() == Some(&1) { u32_at(header, 20)? } else { u32_at(header, 12)? };
-    let timescale = i128::from(timescale).max(1);
     let table = descendant(media, &[b"minf", b"stbl"])?;
     let descriptions = child(table, b"stsd")?;
     let size = u32_at(descriptions, 8)? as usize;
@@ -44,10 +67,7 @@ pub(super) fn read(trak: &[u8], movie_timescale: u32, max_samples: u64) -> Optio
     let description = (kind, descriptions.get(16..8_usize.checked_add(size)?)?);
     let places = places(table, max_samples)?;
     let (edits, delay_ns, media_start) = edits(trak, movie_timescale);
-    let in_ns = |units: i64| {
-        let time_ns = i128::from(units.saturating_sub(media_start)) * 1_000_000_000 / timescale;
-        i64::try_from(time_ns).ok()?.checked_add(delay_ns)
-    };
+    let clock = TrackClock { timescale: i128::from(timescale).max(1), media_start, delay_ns };
     let mut durations = runs(child(table, b"stts")?);
     let mut delays = runs(child(table, b"ctts").unwrap_or_default());
     let mut samples = Vec::with_capacity(places.places.len());
@@ -57,7 +77,8 @@ pub(super) fn read(trak: &[u8], movie_timescale: u32, max_samples: u64) -> Optio
         // Offsets are signed in version 1; in version 0 they are below 2³¹ in practice.
         let presented = decoded.saturating_add(i64::from(delays.next().unwrap_or(0).cast_signed()));
         let end = decoded.saturating_add(i64::from(duration));
-        let (Some(decoded_ns), Some(presented_ns), Some(end_ns)) = (in_ns(decoded), in_ns(presented), in_ns(end))
+        let (Some(decoded_ns), Some(presented_ns), Some(end_ns)) =
+            (clock.in_ns(decoded), clock.in_ns(presented), clock.in_ns(end))
         else {
             break;
         };
@@ -66,8 +87,11 @@ pub(super) fn read(trak: &[u8], movie_timescale: u32, max_samples: u64) -> Optio
         decoded = end;
     }
     let undescribed = places.announced.saturating_sub(samples.len() as u64);
-    let is_upright = child(trak, b"tkhd").is_none_or(is_upright);
-    Some(MovieTrack { handler, description, samples, undescribed, is_upright, edits })
+    let header = child(trak, b"tkhd");
+    let is_upright = header.is_none_or(is_upright);
+    let id = header.and_then(|header| u32_at(header, if header.first() == Some(&1) { 20 } else { 12 })).unwrap_or(0);
+    let end = u64::try_from(decoded).unwrap_or(0);
+    Some(MovieTrack { id, clock, end, handler, description, samples, undescribed, is_upright, edits })
 }
 
 /// Positions of samples in the file.
