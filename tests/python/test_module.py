@@ -87,10 +87,12 @@ class Runs(unittest.TestCase):
             self.assertEqual(list(reopened), ["auto"])
             with self.assertRaisesRegex(dcvins.DcvinsError, "have no log"):
                 reopened.figure()
-        temporary = dcvins.run(LOG, "auto", duration=0.5)
-        path = temporary["auto"].folder
-        self.assertTrue(path.is_dir())
-        del temporary
+        # A run keeps its files without the results that it was taken from.
+        only_run = dcvins.run(LOG, "auto", duration=0.5)["auto"]
+        gc.collect()
+        path = only_run.folder
+        self.assertEqual(only_run.table("frames").rows, 10)
+        del only_run
         gc.collect()
         self.assertFalse(path.exists())
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, Dict, Optional, Sequence
 
-from ._program import StrPath, call_json, options, temporary_folder, text
+from ._program import StrPath, TemporaryFolder, call_json, options, text
 from ._tables import Table, from_records, read_csv
 
 
@@ -13,8 +13,9 @@ class Calibration:
     """Result of `dcvins calibrate`: its files (docs/formats.md) and calibration.json."""
 
     def __init__(self, out: Optional[StrPath]) -> None:
+        self._temporary = TemporaryFolder() if out is None else None
         #: Folder of the files.
-        self.folder = Path(temporary_folder(self) if out is None else out)
+        self.folder = Path(self._temporary.path if self._temporary else text(out))
         #: Content of calibration.json.
         self.json: Dict[str, Any] = {}
 

@@ -120,11 +120,12 @@ def options(**given: Any) -> List[str]:
     return arguments
 
 
-def temporary_folder(owner: object) -> str:
-    """A new folder that is removed with its owner, or at the end of the interpreter."""
-    folder = tempfile.mkdtemp(prefix="dcvins-")
-    weakref.finalize(owner, shutil.rmtree, folder, ignore_errors=True)
-    return folder
+class TemporaryFolder:
+    """A new folder that is removed with the last reference to this value, or at the end of the interpreter."""
+
+    def __init__(self) -> None:
+        self.path = tempfile.mkdtemp(prefix="dcvins-")
+        weakref.finalize(self, shutil.rmtree, self.path, ignore_errors=True)
 
 
 def text(value: Any) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Dict, Iterator, List, Mapping, Optional, 
 
 from ._errors import DcvinsError
 from ._figures import Figure, figure
-from ._program import StrPath, call_json, options, temporary_folder, text, texts
+from ._program import StrPath, TemporaryFolder, call_json, options, text, texts
 from ._tables import Table, from_records, html_table, imported, read_csv
 from ._trajectory import Trajectory
 
@@ -32,6 +32,8 @@ class Run:
         #: Content of summary.json.
         self.summary: Dict[str, Any] = json.loads((self.folder / "summary.json").read_text(encoding="utf-8"))
         self._tables: Dict[str, Table] = {}
+        # A temporary folder lives as long as any of its runs.
+        self._temporary: Optional[TemporaryFolder] = None
 
     @property
     def initialized(self) -> bool:
@@ -125,8 +127,10 @@ class Results(Mapping[str, Run]):
         self._specifications = list(runs)
         self._log_options: Dict[str, Any] = {}
 
-    def _add(self, folders: Sequence[StrPath]) -> None:
-        self._runs.update((run.label, run) for run in map(Run, folders))
+    def _add(self, folders: Sequence[StrPath], temporary: Optional[TemporaryFolder] = None) -> None:
+        for run in map(Run, folders):
+            run._temporary = temporary
+            self._runs[run.label] = run
 
     def __getitem__(self, label: str) -> Run:
         if label not in self._runs:
@@ -216,16 +220,16 @@ def run(
     }
     results = Results(log, specifications)
     results._log_options = {name: value for name, value in log_options.items() if value}
-    if out is None:
-        out = temporary_folder(results)
+    temporary = TemporaryFolder() if out is None else None
+    folder = temporary.path if temporary else text(out)
     given = {**log_options, "trajectory": log_options["trajectories"]}
     del given["trajectories"]
     arguments = options(
-        **given, run=specifications, out=out, break_=stop_when, no_timing=not timing, mcap=mcap, euroc=euroc, force=force
+        **given, run=specifications, out=folder, break_=stop_when, no_timing=not timing, mcap=mcap, euroc=euroc, force=force
     )
     printed = call_json(["run", text(log), *arguments], _WITH_FILES)
     summaries = printed["runs"] if isinstance(printed, dict) else printed
-    results._add([Path(out) / summary["run"] for summary in summaries])
+    results._add([Path(folder) / summary["run"] for summary in summaries], temporary)
     results.stopped = printed["break"]["hit"] if isinstance(printed, dict) else None
     return results
 
