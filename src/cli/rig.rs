@@ -71,6 +71,12 @@ pub(crate) struct NewArguments {
     /// Topic of the IMU, if the log has several.
     #[arg(long, value_name = "TOPIC")]
     pub imu_topic: Option<String>,
+    /// Topic of an IMU in the housing of the gimbal's camera, which becomes imu1.
+    #[arg(long, value_name = "TOPIC")]
+    pub gimbal_imu_topic: Option<String>,
+    /// Axes of that IMU in the camera, x being the viewing direction: flu or frd [default: flu, as assumption].
+    #[arg(long, value_name = "frd|flu", value_parser = body_axes, requires = "gimbal_imu_topic")]
+    pub gimbal_imu_axes: Option<BodyAxes>,
     /// Topic of the images, if the log has several.
     #[arg(long, value_name = "TOPIC")]
     pub image_topic: Option<String>,
@@ -188,6 +194,8 @@ pub(crate) fn rig(arguments: &RigArguments) -> Result<ExitOutcome> {
         imu_axes: arguments.imu_axes,
         position_m: arguments.at.map(Into::into),
         imu_topic: arguments.imu_topic.clone(),
+        gimbal_imu_topic: arguments.gimbal_imu_topic.clone(),
+        gimbal_imu_axes: arguments.gimbal_imu_axes,
         image_topic: arguments.image_topic.clone(),
         joint_topic: arguments.joint_topic.clone(),
         joint_names: arguments.joints.clone(),

@@ -42,6 +42,10 @@ pub(crate) struct SimulateArguments {
     /// Omit the static camera: half the computing time and half the file size.
     #[arg(long)]
     pub no_static_camera: bool,
+    /// Add an IMU on the gimbal, which the rig has as imu1; the factor applies to its noise and biases, 1 for those of
+    /// the vehicle's IMU.
+    #[arg(long, value_name = "FACTOR", num_args = 0..=1, require_equals = true, default_missing_value = "1")]
+    pub gimbal_imu: Option<f64>,
     /// Overwrite any existing log, rig or ground truth of that name. Without it, only a simulated log with its
     /// unmodified rigs is replaced.
     #[arg(long)]
@@ -106,6 +110,7 @@ pub(crate) fn simulate(arguments: &SimulateArguments) -> Result<ExitOutcome> {
     options.resolution_px = arguments.size;
     options.camera_rate_hz = arguments.rate;
     options.static_camera = !arguments.no_static_camera;
+    options.gimbal_imu_noise_scale = arguments.gimbal_imu;
     match arguments.encoder_sigma_deg {
         Some(EncoderArgument::None) => options.encoder_sigma_rad = None,
         Some(EncoderArgument::Sigma(sigma_deg)) => options.encoder_sigma_rad = Some(sigma_deg.to_radians()),

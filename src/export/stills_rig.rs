@@ -52,6 +52,7 @@ pub(super) fn rig_of_stills(stills: &Stills, outcome: &StillsOutcome) -> Rig {
             noise: TYPICAL_IMU_NOISE,
             intrinsics: ImuIntrinsics::default(),
         },
+        gimbal_imu: None,
         cameras,
         gimbal: Some(GimbalRig {
             topic: Some("/joint_states".to_owned()),

@@ -22,6 +22,9 @@ pub struct SensorFrame {
     pub imu: Vec<ImuSample>,
     /// IMU samples after the stamp, the first one at the stamp; empty unless requested from the stream.
     pub imu_after: Vec<ImuSample>,
+    /// Samples of the IMU on the gimbal from the previous frame's stamp to this one's, both ends included and
+    /// interpolated, on the clock of `imu`; empty without such an IMU or where its samples are missing.
+    pub gimbal_imu: Vec<ImuSample>,
     /// Encoder angles at the stamp, from all readings around it; `None` without encoders or if none lies within 0.1 s.
     pub joint_angles: Option<JointAngles>,
     /// Ground truth `world_from_imu` interpolated at the stamp: for comparison and display only, never for estimation.

@@ -27,7 +27,7 @@ pub use joints::{JointAngles, JointMotionFit, JointSample};
 pub use named_axes::{BodyAxes, NamedAxes};
 pub use pose::{LeverArm, MAX_LEVER_ARM_M, NEAREST_POSE_NS, PoseSample, PoseTrack, PositionSample};
 pub use rig::{
-    AssumedField, CameraMask, CameraMount, CameraRig, ChainPrior, GimbalRig, ImuRig, IntrinsicsSigma, Joint, Rig,
-    UnknownCamera,
+    AssumedField, CameraMask, CameraMount, CameraRig, ChainPrior, GimbalImuRig, GimbalRig, ImuRig, IntrinsicsSigma,
+    Joint, Rig, UnknownCamera,
 };
 pub use stills::{MapPoint, StillCamera, StillSet, StillView, Stills, StillsChain};

@@ -39,6 +39,17 @@ pub struct ImuRig {
     pub intrinsics: ImuIntrinsics,
 }
 
+/// IMU on the gimbal, rigidly attached to the camera there.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GimbalImuRig {
+    /// Topic, rate and noise, as of the vehicle's IMU.
+    pub sensor: ImuRig,
+    /// `camera_from_imu1` (`T_cam_imu`): axes and position of this IMU in the frame of the gimbal's camera.
+    pub camera_from_imu: RigidTransform,
+    /// `timeshift_imu1_imu`: `t_imu = t_imu1 + shift`, in seconds.
+    pub timeshift_s: f64,
+}
+
 /// Extrinsics of a camera: rigid, or by the gimbal.
 #[derive(Clone, Debug, PartialEq)]
 pub enum CameraMount {
@@ -188,6 +199,8 @@ pub struct Rig {
     pub name: String,
     pub gravity_m_per_s2: f64,
     pub imu: ImuRig,
+    /// IMU on the gimbal (`imu1`), `None` without one.
+    pub gimbal_imu: Option<GimbalImuRig>,
     /// Cameras in the order of their keys.
     pub cameras: Vec<CameraRig>,
     pub gimbal: Option<GimbalRig>,
@@ -219,9 +232,11 @@ impl Rig {
     /// True if the log times of a topic replace its header stamps.
     pub fn uses_log_time(&self, topic: &str) -> bool {
         let of_imu = self.imu.topic == topic || self.imu.accelerometer_topic.as_deref() == Some(topic);
+        let second = |second: &GimbalImuRig| second.sensor.use_log_time && second.sensor.topic == topic;
         let camera = |camera: &CameraRig| camera.use_log_time && camera.topic == topic;
         let gimbal = |gimbal: &GimbalRig| gimbal.use_log_time && gimbal.topic.as_deref() == Some(topic);
         (self.imu.use_log_time && of_imu)
+            || self.gimbal_imu.as_ref().is_some_and(second)
             || self.cameras.iter().any(camera)
             || self.gimbal.as_ref().is_some_and(gimbal)
             || (self.ground_truth_use_log_time && self.ground_truth_topic.as_deref() == Some(topic))

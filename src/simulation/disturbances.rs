@@ -35,6 +35,8 @@ pub struct Disturbances {
     pub stabilized_s: Option<[f64; 2]>,
     pub spin: Option<[f64; 3]>,
     pub vibration: Option<Vibration>,
+    pub gimbal_vibration: Option<Vibration>,
+    pub gimbal_imu_error: [f64; 2],
 }
 
 /// Default ratio by which the farthest corner of an image is darker than the centre.
@@ -201,6 +203,21 @@ impl Disturbances {
              filter lies at 0.4 of its rate, and what passes beyond half the rate is aliased",
             |it| &mut it.vibration,
             &[1.0..=1000.0, 0.0..=100.0, 0.0..=1000.0],
+        ),
+        key(
+            "gimbal-vibration",
+            "HZ,RAD/S,M/S²",
+            "the same in the IMU on the gimbal (`--gimbal-imu`), with phases of its own",
+            |it| &mut it.gimbal_vibration,
+            &[1.0..=1000.0, 0.0..=100.0, 0.0..=1000.0],
+        ),
+        key(
+            "gimbal-imu-error",
+            "S,RAD",
+            "time offset of the IMU on the gimbal (`t_imu = t_imu1 + S`), and standard deviation of each component of a \
+             rotation of its axes; the given rig has neither",
+            |it| &mut it.gimbal_imu_error,
+            &[-1.0..=1.0, 0.0..=0.5],
         ),
     ];
 

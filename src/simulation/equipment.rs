@@ -9,7 +9,7 @@ use crate::camera::{CameraModel, Distortion, Projection};
 use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::ClassicalChain;
 use crate::sensors::{
-    CameraMount, CameraRig, ChainPrior, GimbalRig, ImuIntrinsics, ImuIntrinsicsParameters, ImuRig, Rig,
+    CameraMount, CameraRig, ChainPrior, GimbalImuRig, GimbalRig, ImuIntrinsics, ImuIntrinsicsParameters, ImuRig, Rig,
     ScaleMisalignment,
 };
 use crate::text::Named;
@@ -64,6 +64,8 @@ pub(crate) struct Equipment {
     pub(crate) camera_time_offset_s: f64,
     pub(crate) readout_s: f64,
     pub(crate) encoder_sigma_rad: Option<f64>,
+    /// True for an IMU on the gimbal.
+    pub(crate) gimbal_imu: bool,
 }
 
 impl Equipment {
@@ -118,6 +120,7 @@ impl Equipment {
                 noise: FIREFLY_IMU,
                 intrinsics: ImuIntrinsics::default(),
             },
+            gimbal_imu: (self.gimbal_camera && self.gimbal_imu).then(gimbal_imu),
             cameras,
             gimbal,
             ground_truth_topic: Some("/ground_truth/odometry".to_owned()),
@@ -125,6 +128,27 @@ impl Equipment {
             ground_truth_lever_arm: None,
             assumed: Vec::new(),
         }
+    }
+}
+
+/// IMU in the housing of the gimbal's camera, of the same quality as the vehicle's, so that a comparison does not depend
+/// on a better sensor: x forward, y left, z up in the camera, 2 cm behind the lens.
+fn gimbal_imu() -> GimbalImuRig {
+    let axes = Matrix3::new(0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0);
+    let axes = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes));
+    let tilt = so3::exp(&Vector3::new(0.011, -0.018, 0.014));
+    GimbalImuRig {
+        sensor: ImuRig {
+            topic: "/gimbal/imu".to_owned(),
+            accelerometer_topic: None,
+            use_log_time: false,
+            frame_id: "gimbal_imu".to_owned(),
+            rate_hz: IMU_RATE_HZ,
+            noise: FIREFLY_IMU,
+            intrinsics: ImuIntrinsics::default(),
+        },
+        camera_from_imu: RigidTransform::new(axes * tilt, Vector3::new(-0.012, 0.009, -0.021)),
+        timeshift_s: 0.0,
     }
 }
 

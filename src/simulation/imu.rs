@@ -29,6 +29,13 @@ pub struct SimulatedBias {
     pub gyroscope_rad_per_s: Vector3<f64>,
 }
 
+/// True angular velocity and specific force at one time, in the IMU frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct ImuMotion {
+    pub(super) angular_velocity_rad_per_s: Vector3<f64>,
+    pub(super) specific_force_m_per_s2: Vector3<f64>,
+}
+
 /// All samples of a flight with their biases.
 #[derive(Clone, Debug)]
 pub(crate) struct ImuRecord {
@@ -46,6 +53,27 @@ impl ImuRecord {
         random: &mut RandomStream,
     ) -> Self {
         let count = (trajectory.duration_s() * rate_hz).floor() as usize + 1;
+        let times_s = (0..count).map(|index| index as f64 / rate_hz);
+        let motion = |time_s: f64| {
+            let ground_truth = trajectory.at(time_s);
+            ImuMotion {
+                angular_velocity_rad_per_s: ground_truth.angular_velocity_rad_per_s,
+                specific_force_m_per_s2: ground_truth.specific_force_m_per_s2,
+            }
+        };
+        Self::of_motion(times_s, motion, noise, rate_hz, noise_scale, random)
+    }
+
+    /// Simulates samples at these times of a motion; `noise_scale` 0 gives ideal samples without bias.
+    pub(super) fn of_motion(
+        times_s: impl ExactSizeIterator<Item = f64>,
+        motion: impl Fn(f64) -> ImuMotion,
+        noise: &ImuNoise,
+        rate_hz: f64,
+        noise_scale: f64,
+        random: &mut RandomStream,
+    ) -> Self {
+        let count = times_s.len();
         let mut bias = SimulatedBias {
             accelerometer_m_per_s2: random.normal_vector(ACCELEROMETER_TURN_ON_M_PER_S2 * noise_scale),
             gyroscope_rad_per_s: random.normal_vector(GYROSCOPE_TURN_ON_RAD_PER_S * noise_scale),
@@ -53,9 +81,8 @@ impl ImuRecord {
         let white = noise_scale * rate_hz.sqrt();
         let walk = noise_scale / rate_hz.sqrt();
         let mut record = Self { samples: Vec::with_capacity(count), biases: Vec::with_capacity(count) };
-        for index in 0..count {
-            let time_s = index as f64 / rate_hz;
-            let ground_truth = trajectory.at(time_s);
+        for time_s in times_s {
+            let ground_truth = motion(time_s);
             record.samples.push(ImuSample {
                 stamp_ns: ns_from_seconds(time_s),
                 angular_velocity_rad_per_s: ground_truth.angular_velocity_rad_per_s

@@ -14,6 +14,7 @@ mod error;
 mod exercise;
 mod experiment;
 mod gimbal;
+mod gimbal_imu;
 mod imu;
 mod interval;
 mod motion;

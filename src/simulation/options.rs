@@ -24,6 +24,8 @@ pub struct SimulationOptions {
     pub start_error: ChainPrior,
     /// Factor of noise, bias random walk and turn-on biases of the IMU; 0 makes it ideal.
     pub imu_noise_scale: f64,
+    /// Factor of noise and biases of an IMU on the gimbal; `None` without one.
+    pub gimbal_imu_noise_scale: Option<f64>,
     pub lens: Lens,
     pub resolution_px: [usize; 2],
     pub camera_rate_hz: f64,
@@ -49,6 +51,7 @@ impl SimulationOptions {
             encoder_sigma_rad: Some(experiment.encoder_sigma_rad()),
             start_error: experiment.start_error(),
             imu_noise_scale: 1.0,
+            gimbal_imu_noise_scale: None,
             lens: Lens::Pinhole,
             resolution_px: [640, 480],
             camera_rate_hz: 20.0,
@@ -74,6 +77,9 @@ impl SimulationOptions {
         within("translation bound in metres", self.start_error.translation_bound_m, 0.0, 1.0)?;
         within("rotation bound in degrees", self.start_error.rotation_bound_rad.to_degrees(), 0.0, 90.0)?;
         within("scale of the IMU noise", self.imu_noise_scale, 0.0, 1000.0)?;
+        if let Some(scale) = self.gimbal_imu_noise_scale {
+            within("scale of the gimbal IMU's noise", scale, 0.0, 1000.0)?;
+        }
         within("image width", self.resolution_px[0] as f64, 32.0, 4096.0)?;
         within("image height", self.resolution_px[1] as f64, 24.0, 4096.0)?;
         within("camera rate in Hz", self.camera_rate_hz, 0.1, 200.0)?;

@@ -26,7 +26,7 @@ use super::world;
 use crate::flight_log::output::OutputSet;
 use crate::flight_log::{LogError, LogWriter, LogWriterOptions, MessageTimes, Odometry};
 use crate::geometry::{ns_from_seconds, seconds_from_ns, so3};
-use crate::sensors::{CameraRig, ImuSample, JointSample};
+use crate::sensors::{CameraRig, ImuRig, ImuSample, JointSample};
 use crate::text::Named as _;
 
 /// Start of simulated logs: 15 June 2025, 15:06:40 UTC.
@@ -168,6 +168,7 @@ fn fly_scenario(options: &SimulationOptions, name: &str) -> Result<Scenario, Sim
                 camera_time_offset_s: options.disturbances.camera_time_offset_s,
                 readout_s: options.disturbances.readout_s,
                 encoder_sigma_rad: options.encoder_sigma_rad,
+                gimbal_imu: options.gimbal_imu_noise_scale.is_some(),
             },
             start_error: options.start_error,
             imu_noise_scale: options.imu_noise_scale,
@@ -175,6 +176,13 @@ fn fly_scenario(options: &SimulationOptions, name: &str) -> Result<Scenario, Sim
     );
     if let Some(prescribed) = &prescribed {
         scenario.joints = Some(prescribed.joints(&scenario)?);
+    }
+    if let Some(noise_scale) = options.gimbal_imu_noise_scale {
+        scenario.measure_gimbal_imu(noise_scale);
+        scenario.spoil_gimbal_imu(options.disturbances.gimbal_imu_error);
+    }
+    if let (Some(vibration), Some(record)) = (&options.disturbances.gimbal_vibration, &mut scenario.gimbal_imu_record) {
+        shake(record, &scenario.trajectory, vibration, &mut random(stream::GIMBAL_VIBRATION));
     }
     if let Some(vibration) = &options.disturbances.vibration {
         shake(&mut scenario.imu_record, &scenario.trajectory, vibration, &mut random(stream::VIBRATION));
@@ -208,6 +216,7 @@ enum Message {
     Imu(usize),
     Joints(usize),
     Image(usize),
+    GimbalImu(usize),
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -220,6 +229,7 @@ struct Shot {
 /// All recorded measurements in the order of measurement.
 struct Recordings {
     imu: Vec<ImuSample>,
+    gimbal_imu: Vec<ImuSample>,
     joints: Vec<JointSample>,
     true_joints: Vec<JointSample>,
     shots: Vec<Shot>,
@@ -244,11 +254,13 @@ fn write_messages(
         let times = |stamp_ns: i64| MessageTimes { stamp_ns: EPOCH_NS + stamp_ns, log_time_ns: EPOCH_NS + log_time_ns };
         match message {
             Message::Imu(index) => {
-                let ImuSample { stamp_ns, angular_velocity_rad_per_s, specific_force_m_per_s2 } =
-                    &recordings.imu[index];
-                let imu = &rig.imu;
-                let times = times(*stamp_ns);
-                log.write_imu(&imu.topic, &imu.frame_id, times, angular_velocity_rad_per_s, specific_force_m_per_s2)?;
+                write_imu(log, &rig.imu, times(recordings.imu[index].stamp_ns), &recordings.imu[index])?;
+            }
+            Message::GimbalImu(index) => {
+                let sample = &recordings.gimbal_imu[index];
+                if let Some(imu) = &rig.gimbal_imu {
+                    write_imu(log, &imu.sensor, times(sample.stamp_ns), sample)?;
+                }
             }
             Message::Truth(index) => {
                 let stamp_ns = recordings.imu[index].stamp_ns;
@@ -296,6 +308,11 @@ fn write_messages(
     Ok(done)
 }
 
+fn write_imu(log: &mut LogWriter, imu: &ImuRig, times: MessageTimes, sample: &ImuSample) -> Result<(), LogError> {
+    let (rate, force) = (&sample.angular_velocity_rad_per_s, &sample.specific_force_m_per_s2);
+    log.write_imu(&imu.topic, &imu.frame_id, times, rate, force)
+}
+
 fn recordings(options: &SimulationOptions, scenario: &Scenario) -> Recordings {
     let start_ns = ns_from_seconds(options.disturbances.joint_start_s);
     let mut joints = options.encoder_sigma_rad.map(|sigma| scenario.encoder_samples(sigma)).unwrap_or_default();
@@ -322,7 +339,14 @@ fn recordings(options: &SimulationOptions, scenario: &Scenario) -> Recordings {
     }
     // In the order of writing.
     shots.sort_by_key(|shot| (shot.stamp_ns, shot.camera));
-    Recordings { imu: scenario.imu_record.samples.clone(), joints, true_joints: scenario.true_joint_samples(), shots }
+    let gimbal_imu = scenario.gimbal_imu_record.as_ref().map_or_else(Vec::new, |record| record.samples.clone());
+    Recordings {
+        imu: scenario.imu_record.samples.clone(),
+        gimbal_imu,
+        joints,
+        true_joints: scenario.true_joint_samples(),
+        shots,
+    }
 }
 
 /// All messages in the order of their log times, which follow the stamps by a delay with jitter.
@@ -345,6 +369,9 @@ fn schedule(recordings: &Recordings, seed: u64) -> Vec<(i64, Message)> {
         let delay = late(DELAYS_S[2] + DELAYS_S[3] * shot.camera as f64);
         before_ns = (shot.stamp_ns + delay).max(before_ns);
         messages.push((before_ns, Message::Image(index)));
+    }
+    for (index, sample) in recordings.gimbal_imu.iter().enumerate() {
+        messages.push((sample.stamp_ns + late(DELAYS_S[0]), Message::GimbalImu(index)));
     }
     messages.sort_unstable();
     messages
@@ -475,6 +502,13 @@ fn ground_truth_notes(options: &SimulationOptions, scenario: &Scenario, chain_er
     entry("gyroscope_bias_end", list(&last.gyroscope_rad_per_s));
     entry("accelerometer_bias_start", list(&first.accelerometer_m_per_s2));
     entry("accelerometer_bias_end", list(&last.accelerometer_m_per_s2));
+    if let Some(record) = &scenario.gimbal_imu_record {
+        let [first, last] = [record.biases.first(), record.biases.last()].map(|bias| bias.copied().unwrap_or_default());
+        entry("gimbal_gyroscope_bias_start", list(&first.gyroscope_rad_per_s));
+        entry("gimbal_gyroscope_bias_end", list(&last.gyroscope_rad_per_s));
+        entry("gimbal_accelerometer_bias_start", list(&first.accelerometer_m_per_s2));
+        entry("gimbal_accelerometer_bias_end", list(&last.accelerometer_m_per_s2));
+    }
     entry("air_drag_per_s", format!("{AIR_DRAG_PER_S:?}"));
     entry("given_chain_error", format!("{{translation_m: {:?}, rotation_rad: {:?}}}", chain_error.0, chain_error.1));
     notes

@@ -57,6 +57,8 @@ pub struct SyntheticOptions {
     pub imu_noise_scale: f64,
     /// Standard deviation of the encoders; `None` without encoders.
     pub encoder_sigma_rad: Option<f64>,
+    /// True for an IMU on the gimbal, with the noise scale of the vehicle's.
+    pub gimbal_imu: bool,
     /// Delays of the camera's exposures and of the encoder readings after their stamps, in seconds.
     pub clock_offsets_s: [f64; 2],
     /// Readout of the camera: each landmark is observed at the time of its row. Absent from the given rig.
@@ -91,6 +93,7 @@ impl Default for SyntheticOptions {
             features: 150,
             imu_noise_scale: 1.0,
             encoder_sigma_rad: Some(0.5_f64.to_radians()),
+            gimbal_imu: false,
             clock_offsets_s: [0.0; 2],
             readout_s: 0.0,
             intrinsics_error: IntrinsicsError::default(),
@@ -113,6 +116,8 @@ pub struct SyntheticFrame {
     /// IMU samples from the previous frame's stamp to this one's, both ends included and interpolated; those of the
     /// first frame begin at the start of the flight.
     pub imu: Vec<ImuSample>,
+    /// Samples of the IMU on the gimbal over the same interval; empty without one.
+    pub gimbal_imu: Vec<ImuSample>,
     /// Encoder angles; `None` without encoders.
     pub joint_angles_rad: Option<Vec<f64>>,
     pub tracks: TrackedFrame,
@@ -173,6 +178,7 @@ pub fn synthetic_tracks(options: &SyntheticOptions) -> SyntheticFlight {
         camera_time_offset_s: 0.0,
         readout_s: options.readout_s,
         encoder_sigma_rad: options.encoder_sigma_rad,
+        gimbal_imu: options.gimbal_imu,
     };
     let swing_deg = options.look_around_rad.to_degrees();
     let look = LookAround::new(
@@ -197,7 +203,9 @@ pub fn synthetic_tracks(options: &SyntheticOptions) -> SyntheticFlight {
     {
         motion.exercise_from(*start_s, exercise, &gimbal.joints);
     }
+    scenario.measure_gimbal_imu(options.imu_noise_scale);
     spoil(&mut scenario, options);
+    let gimbal_imu = scenario.gimbal_imu_record.as_ref();
     let camera = &scenario.true_rig.cameras[0];
     let mut encoders = RandomStream::new(options.seed, stream::ENCODERS);
     let mut tracker = Tracker::new(camera.model.clone(), scenario.given_rig.cameras[0].model.clone(), options);
@@ -227,6 +235,7 @@ pub fn synthetic_tracks(options: &SyntheticOptions) -> SyntheticFlight {
             index,
             stamp_ns,
             imu: scenario.imu_record.between(previous_ns, stamp_ns),
+            gimbal_imu: gimbal_imu.map_or_else(Vec::new, |record| record.between(previous_ns, stamp_ns)),
             joint_angles_rad: read_angles_rad,
             tracks: tracker.track(stamp_ns, &world_from_camera),
             true_world_from_imu: ground_truth.world_from_imu,

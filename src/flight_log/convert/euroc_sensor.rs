@@ -148,6 +148,7 @@ pub(super) fn rig_of(
         name,
         gravity_m_per_s2: GRAVITY_M_PER_S2,
         imu,
+        gimbal_imu: None,
         cameras: described,
         gimbal: None,
         ground_truth_topic,

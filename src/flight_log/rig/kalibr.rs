@@ -53,6 +53,7 @@ pub(super) fn read_camera_chain(
         name: name.to_owned(),
         gravity_m_per_s2: read::STANDARD_GRAVITY_M_PER_S2,
         imu,
+        gimbal_imu: None,
         cameras,
         gimbal: None,
         ground_truth_topic: None,

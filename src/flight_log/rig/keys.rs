@@ -15,7 +15,7 @@ struct Keys {
 }
 
 const ROOT: Keys = Keys {
-    read: &["rig_version", "name", "gravity", "imu0", "cam0", "gimbal", "ground_truth", "assumed"],
+    read: &["rig_version", "name", "gravity", "imu0", "imu1", "cam0", "gimbal", "ground_truth", "assumed"],
     // Written by `dcvins calibrate` and `dcvins simulate` at the end of a rig.
     unused: APPENDICES,
 };
@@ -37,6 +37,25 @@ const IMU: Keys = Keys {
         "accelerometers",
     ],
     unused: &["model", "T_i_b", "time_offset", "Tw", "R_IMUtoGYRO", "Ta", "R_IMUtoACC", "Tg"],
+};
+/// IMU on the gimbal, `imu1` with `mount: gimbal`.
+const GIMBAL_IMU: Keys = Keys {
+    read: &[
+        "mount",
+        "rostopic",
+        "use_log_time",
+        "frame_id",
+        "update_rate",
+        "accelerometer_noise_density",
+        "accelerometer_random_walk",
+        "gyroscope_noise_density",
+        "gyroscope_random_walk",
+        "gyroscopes",
+        "accelerometers",
+        "T_cam_imu",
+        "timeshift_imu1_imu",
+    ],
+    unused: IMU.unused,
 };
 const CAMERA: Keys = Keys {
     read: &[
@@ -125,7 +144,7 @@ pub(super) fn check_imu_file(document: &Value, file: &Path) -> Result<Vec<String
     if document.get("imu0").is_some() {
         check_root(document, &mut found);
     } else {
-        check_imu(document, "", &mut found);
+        check_imu(document, "", &IMU, &mut found);
     }
     found.into_result(file)
 }
@@ -141,6 +160,7 @@ pub(super) fn is_of_mapping(key: &str, mapping: &str) -> bool {
         "gimbal" => &GIMBAL,
         "ground_truth" => &GROUND_TRUTH,
         mapping if is_numbered(mapping, "cam") => &CAMERA,
+        "imu1" => &GIMBAL_IMU,
         mapping if is_numbered(mapping, "imu") => &IMU,
         _ => return false,
     };
@@ -156,19 +176,20 @@ fn check_root(document: &Value, found: &mut Found) {
     let Some(mapping) = document.as_object() else { return };
     for (key, value) in mapping {
         match key.as_str() {
-            "imu0" => check_imu(value, key, found),
+            "imu0" => check_imu(value, key, &IMU, found),
+            "imu1" if value.get("mount").is_some() => check_imu(value, key, &GIMBAL_IMU, found),
             "gimbal" => check_gimbal(value, found),
             "ground_truth" => check_mapping(value, key, &GROUND_TRUTH, found),
             key if is_numbered(key, "cam") => check_camera(value, key, found),
-            // One IMU is estimated; Kalibr's files may have several.
+            // Kalibr's files may have several IMUs on the vehicle, of which the first is used.
             key if is_numbered(key, "imu") => found.unused.push(key.to_owned()),
             key => found.check_key("", key, &ROOT),
         }
     }
 }
 
-fn check_imu(imu: &Value, path: &str, found: &mut Found) {
-    check_mapping(imu, path, &IMU, found);
+fn check_imu(imu: &Value, path: &str, keys: &Keys, found: &mut Found) {
+    check_mapping(imu, path, keys, found);
     for (key, keys) in [("gyroscopes", &GYROSCOPES), ("accelerometers", &ACCELEROMETERS)] {
         if let Some(sensor) = imu.get(key) {
             let path = if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") };

@@ -12,8 +12,8 @@ use super::sensor;
 use crate::camera::{CameraError, CameraModel};
 use crate::gimbal::{ClassicalChain, InverseChain};
 use crate::sensors::{
-    AssumedField, CameraMount, CameraRig, ChainPrior, GimbalRig, ImuNoise, ImuRig, Joint, LeverArm, MAX_LEVER_ARM_M,
-    Rig,
+    AssumedField, CameraMount, CameraRig, ChainPrior, GimbalImuRig, GimbalRig, ImuNoise, ImuRig, Joint, LeverArm,
+    MAX_LEVER_ARM_M, Rig,
 };
 
 const RIG_VERSION: u64 = 1;
@@ -43,6 +43,7 @@ pub(super) fn read_rig(root: &Field<'_>, default_name: &str, facts: &dyn CameraF
     let gravity_m_per_s2 = root.field("gravity").positive("gravity's magnitude in m/s²")?;
     let imu = read_imu(&root.field("imu0"), None)?;
     let gimbal = root.field("gimbal").optional().map(|gimbal| read_gimbal(&gimbal)).transpose()?;
+    let gimbal_imu = read_gimbal_imu(root, &imu, gimbal.is_some())?;
     let keys = camera_keys(root)?;
     if keys.is_empty() {
         return Err(root.field("cam0").unexpected("at least one camera, cam0"));
@@ -65,6 +66,7 @@ pub(super) fn read_rig(root: &Field<'_>, default_name: &str, facts: &dyn CameraF
         name,
         gravity_m_per_s2,
         imu,
+        gimbal_imu,
         cameras,
         gimbal,
         ground_truth_topic,
@@ -148,6 +150,30 @@ pub(super) fn read_imu(imu: &Field<'_>, default_topic: Option<&str>) -> Result<I
         },
         intrinsics: sensor::read_imu_intrinsics(imu)?,
     })
+}
+
+/// Reads the IMU on the gimbal; `None` without `imu1`, or if it has no `mount` as in Kalibr's files.
+fn read_gimbal_imu(root: &Field<'_>, vehicle: &ImuRig, has_gimbal: bool) -> Result<Option<GimbalImuRig>, LogError> {
+    const MOUNT: &str = "gimbal (the IMU moves with the gimbal's camera)";
+    let Some(imu) = root.field("imu1").optional().filter(|imu| imu.field("mount").is_present()) else {
+        return Ok(None);
+    };
+    if imu.field("mount").text(MOUNT)? != "gimbal" {
+        return Err(imu.field("mount").unexpected(MOUNT));
+    }
+    if !has_gimbal {
+        return Err(root.field("gimbal").unexpected("a gimbal, since imu1.mount is gimbal"));
+    }
+    let sensor = read_imu(&imu, None)?;
+    if sensor.topic == vehicle.topic {
+        return Err(imu.field("rostopic").error("is the topic of imu0, expected the topic of the gimbal's IMU"));
+    }
+    let shift = imu.field("timeshift_imu1_imu");
+    let timeshift_s = if shift.is_present() { shift.number("seconds, t_imu = t_imu1 + shift")? } else { 0.0 };
+    if timeshift_s.abs() > MAX_TIMESHIFT_S {
+        return Err(shift.unexpected("seconds, at most 60 either way"));
+    }
+    Ok(Some(GimbalImuRig { sensor, camera_from_imu: imu.field("T_cam_imu").transform()?, timeshift_s }))
 }
 
 fn read_camera(camera: &Field<'_>, key: &str, facts: &dyn CameraFacts) -> Result<CameraRig, LogError> {

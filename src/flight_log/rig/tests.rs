@@ -51,6 +51,49 @@ fn log_times_in_place_of_stamps_are_read_and_written() {
     assert!(error.starts_with("imu0.use_log_time: holds 1, expected true or false"), "{error}");
 }
 
+/// Test rig with an IMU on the gimbal, whose entries end with `more`.
+fn with_gimbal_imu(more: &str) -> String {
+    let noise = "accelerometer_noise_density: 0.002, accelerometer_random_walk: 0.0004, \
+                 gyroscope_noise_density: 0.00012, gyroscope_random_walk: 0.00002";
+    let axes = "T_cam_imu: [[0, -1, 0, 0.01], [0, 0, -1, 0.02], [1, 0, 0, -0.03], [0, 0, 0, 1]]";
+    format!("{RIG}\nimu1: {{mount: gimbal, rostopic: /gimbal/imu, update_rate: 200, {noise}, {axes}{more}}}\n")
+}
+
+#[test]
+fn an_imu_on_the_gimbal_reads_back_as_written() {
+    assert_eq!(parse(RIG).unwrap().gimbal_imu, None);
+    let rig = parse(&with_gimbal_imu(", timeshift_imu1_imu: 0.012, use_log_time: true")).unwrap();
+    let imu = rig.gimbal_imu.as_ref().unwrap();
+    assert_eq!((imu.sensor.topic.as_str(), imu.timeshift_s), ("/gimbal/imu", 0.012));
+    // The x axis of the IMU is the camera's viewing direction.
+    let forward = imu.camera_from_imu.rotation * Vector3::x();
+    assert!((forward - Vector3::z()).norm() < 1e-12, "{forward}");
+    assert!(rig.uses_log_time("/gimbal/imu") && !rig.uses_log_time("/imu"));
+    let again = parse(&rig.to_yaml()).unwrap().gimbal_imu.unwrap();
+    assert_eq!(again.sensor, imu.sensor);
+    assert!((again.camera_from_imu.to_matrix() - imu.camera_from_imu.to_matrix()).amax() < 1e-12);
+    // Kalibr's further IMUs have no mount.
+    let kalibr = parse(&with_gimbal_imu("").replace("mount: gimbal, rostopic: /gimbal/imu", "rostopic: /gimbal/imu"));
+    assert_eq!(kalibr.unwrap().gimbal_imu, None);
+}
+
+#[test]
+fn a_wrong_imu_on_the_gimbal_is_named() {
+    let check = |from: &str, to: &str, expected: &str| {
+        let text = with_gimbal_imu("");
+        assert!(text.contains(from), "{from}");
+        let error = parse(&text.replace(from, to)).unwrap_err();
+        assert!(error.contains(expected), "{to}: {error}");
+    };
+    check("{mount: gimbal, rostopic: /gimbal/imu", "{mount: tail, rostopic: /gimbal/imu", "imu1.mount");
+    check("rostopic: /gimbal/imu", "rostopic: /imu", "topic of imu0");
+    check("gyroscope_random_walk: 0.00002, ", "", "imu1.gyroscope_random_walk");
+    check("T_cam_imu: [[0, -1, 0, 0.01],", "T_cam_imu: [[0, -2, 0, 0.01],", "imu1.T_cam_imu");
+    check("update_rate: 200, accel", "update_rate: 200, axes: z, accel", "imu1.axes");
+    let error = parse(&with_gimbal_imu(", timeshift_imu1_imu: 100")).unwrap_err();
+    assert!(error.contains("imu1.timeshift_imu1_imu"), "{error}");
+}
+
 /// Test rig with a source in place of its topic of joint angles.
 fn with_source(source: &str) -> String {
     RIG.replace("rostopic: /joints", &format!("source: {source}"))

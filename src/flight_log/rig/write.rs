@@ -6,7 +6,9 @@ use super::super::yaml::{number, numbers, text};
 use super::attitude;
 use crate::geometry::RigidTransform;
 use crate::gimbal::DhLink;
-use crate::sensors::{AssumedField, CameraMount, CameraRig, GimbalRig, ImuIntrinsics, LeverArm, Rig};
+use crate::sensors::{
+    AssumedField, CameraMount, CameraRig, GimbalImuRig, GimbalRig, ImuIntrinsics, ImuRig, LeverArm, Rig,
+};
 
 impl Rig {
     /// Returns the rig as a YAML file, with its chain in the classical parameterization. Numbers read back exactly;
@@ -17,18 +19,16 @@ impl Rig {
         line(&mut out, 0, "name", &text(&self.name));
         line(&mut out, 0, "gravity", &number(self.gravity_m_per_s2));
         line(&mut out, 0, "imu0", "");
-        line(&mut out, 1, "rostopic", &text(&self.imu.topic));
-        if let Some(topic) = &self.imu.accelerometer_topic {
-            line(&mut out, 1, "accelerometer_rostopic", &text(topic));
+        write_imu(&mut out, &self.imu);
+        if let Some(GimbalImuRig { sensor, camera_from_imu, timeshift_s }) = &self.gimbal_imu {
+            line(&mut out, 0, "imu1", "");
+            line(&mut out, 1, "mount", "gimbal");
+            write_imu(&mut out, sensor);
+            if *timeshift_s != 0.0 {
+                line(&mut out, 1, "timeshift_imu1_imu", &number(*timeshift_s));
+            }
+            write_transform(&mut out, 1, "T_cam_imu", camera_from_imu);
         }
-        log_time(&mut out, self.imu.use_log_time);
-        line(&mut out, 1, "frame_id", &text(&self.imu.frame_id));
-        line(&mut out, 1, "update_rate", &number(self.imu.rate_hz));
-        line(&mut out, 1, "accelerometer_noise_density", &number(self.imu.noise.accelerometer_noise_density));
-        line(&mut out, 1, "accelerometer_random_walk", &number(self.imu.noise.accelerometer_random_walk));
-        line(&mut out, 1, "gyroscope_noise_density", &number(self.imu.noise.gyroscope_noise_density));
-        line(&mut out, 1, "gyroscope_random_walk", &number(self.imu.noise.gyroscope_random_walk));
-        write_imu_intrinsics(&mut out, &self.imu.intrinsics);
         for camera in &self.cameras {
             write_camera(&mut out, camera);
         }
@@ -55,6 +55,22 @@ impl Rig {
         }
         out
     }
+}
+
+/// Writes topic, rate, noise and intrinsics of an IMU.
+fn write_imu(out: &mut String, imu: &ImuRig) {
+    line(out, 1, "rostopic", &text(&imu.topic));
+    if let Some(topic) = &imu.accelerometer_topic {
+        line(out, 1, "accelerometer_rostopic", &text(topic));
+    }
+    log_time(out, imu.use_log_time);
+    line(out, 1, "frame_id", &text(&imu.frame_id));
+    line(out, 1, "update_rate", &number(imu.rate_hz));
+    line(out, 1, "accelerometer_noise_density", &number(imu.noise.accelerometer_noise_density));
+    line(out, 1, "accelerometer_random_walk", &number(imu.noise.accelerometer_random_walk));
+    line(out, 1, "gyroscope_noise_density", &number(imu.noise.gyroscope_noise_density));
+    line(out, 1, "gyroscope_random_walk", &number(imu.noise.gyroscope_random_walk));
+    write_imu_intrinsics(out, &imu.intrinsics);
 }
 
 /// Writes that log times replace the header stamps.

@@ -8,8 +8,10 @@ use super::super::messages::MessageKind;
 use super::super::{FlightLog, LogError, LogWarning, SensorFrame, WarningKind};
 use super::camera::CameraStream;
 use super::gaps::GapWatch;
+use super::gimbal_imu::GimbalImuStream;
 use super::ground_truth::GroundTruth;
 use super::imu::ImuStream;
+use super::imu_buffer::{FIRST_FRAME_IMU_NS, ImuBuffer};
 use super::joint_angles::JointAngleStream;
 use super::joint_topic::JointSamples;
 use super::read_context::ReadContext;
@@ -20,8 +22,6 @@ use crate::text::counted;
 /// Images without joint angles for a shorter time are not reported: attitudes of gimbals come at 5 Hz or more.
 const WITHOUT_JOINTS_NS: i64 = 400_000_000;
 
-/// Duration of the IMU samples before the first frame.
-const FIRST_FRAME_IMU_NS: i64 = 2_000_000_000;
 /// Largest delay of log times after header stamps; reading starts this much earlier.
 const SEEK_MARGIN_NS: i64 = 1_000_000_000;
 /// Assembles the frames of one camera, in order.
@@ -34,16 +34,14 @@ pub(super) struct FrameSource {
     imu_ended: bool,
     /// Stamp of the last sample of a rotation.
     rotating_ns: Option<i64>,
-    /// IMU samples not before the previous frame, and the first one after the frame.
-    samples: VecDeque<ImuSample>,
+    buffer: ImuBuffer,
+    gimbal_imu: Option<GimbalImuStream>,
     joints: Option<JointAngleStream>,
     /// Topic of the joint angles of a camera on a gimbal.
     joint_topic: Option<String>,
     /// Stamp of the first of the last images without joint angles.
     without_joints_ns: Option<i64>,
     ground_truth: Option<GroundTruth>,
-    /// IMU sample interpolated at the previous frame's end.
-    previous_end: Option<ImuSample>,
     /// Stamp of the previous image, in camera time.
     previous_image_ns: Option<i64>,
     start_ns: i64,
@@ -76,6 +74,7 @@ impl FrameSource {
         let half_interval_ns = half_interval_ns(camera.rate_hz, log.topic(&camera.topic).map_or(0.0, |it| it.rate_hz));
         let joints = joint_angles(log, rig, from_ns, half_interval_ns)?;
         let ground_truth = GroundTruth::new(log, rig, from_ns, &mut context);
+        let gimbal_imu = rig.gimbal_imu.as_ref().map(|imu| GimbalImuStream::new(log, imu, from_ns)).transpose()?;
         let unset = |warning: &&LogWarning| warning.kind == WarningKind::Stamps && rig.uses_log_time(&warning.subject);
         let log_warnings = log.warnings().iter().filter(|warning| !unset(warning)).cloned().collect();
         Ok(Self {
@@ -86,12 +85,12 @@ impl FrameSource {
             imu_gaps: GapWatch::new(WarningKind::ImuGap, &rig.imu.topic, rig.imu.rate_hz),
             imu_ended: false,
             rotating_ns: None,
-            samples: VecDeque::new(),
+            buffer: ImuBuffer::default(),
+            gimbal_imu,
             without_joints_ns: None,
             joint_topic: joints.is_some().then(|| joint_topic(rig, camera)).flatten(),
             joints,
             ground_truth,
-            previous_end: None,
             previous_image_ns: None,
             start_ns,
             end_ns,
@@ -119,26 +118,31 @@ impl FrameSource {
             }
             let imu_stamp_ns = stamp_ns + self.camera.shift_ns;
             self.read_imu_until(imu_stamp_ns);
-            let Some(last) = self.samples.back().filter(|last| last.stamp_ns >= imu_stamp_ns).copied() else {
+            let Some(last) = self.buffer.samples.back().filter(|last| last.stamp_ns >= imu_stamp_ns).copied() else {
                 self.warn_of_imu_end(stamp_ns, pending.number);
                 return None;
             };
-            let first_known = self.samples.front().map_or(last.stamp_ns, |first| first.stamp_ns);
-            if self.previous_end.is_none() && first_known > imu_stamp_ns {
+            let first_known = self.buffer.samples.front().map_or(last.stamp_ns, |first| first.stamp_ns);
+            if self.buffer.previous_end.is_none() && first_known > imu_stamp_ns {
                 self.skipped += usize::from(stamp_ns >= self.start_ns);
                 continue;
             }
             if stamp_ns < self.start_ns {
-                self.forget_samples_before(imu_stamp_ns - FIRST_FRAME_IMU_NS);
+                let before_ns = imu_stamp_ns - FIRST_FRAME_IMU_NS;
+                self.buffer.forget_before(before_ns);
+                if let Some(imu) = &mut self.gimbal_imu {
+                    imu.forget_before(&mut self.context, before_ns);
+                }
                 continue;
             }
             let (number, log_time_ns) = (pending.number, pending.log_time_ns);
             let rotates = self.rotating_ns.is_some_and(|rotating_ns| imu_stamp_ns - rotating_ns < ROTATING_NS);
             let Some(image) = self.camera.decode(&mut self.context, stamp_ns, pending, rotates) else { continue };
             self.warn_of_skipped_images();
-            let imu = self.take_imu(imu_stamp_ns);
+            let imu = self.buffer.take(imu_stamp_ns);
             let imu_after = self.imu_after(imu_stamp_ns);
             let context = &mut self.context;
+            let gimbal_imu = self.gimbal_imu.as_mut().map_or_else(Vec::new, |imu| imu.take(context, imu_stamp_ns));
             let joint_angles = self.joints.as_mut().and_then(|joints| joints.at(context, imu_stamp_ns, previous_ns));
             let ground_truth = self.ground_truth.as_mut().and_then(|poses| poses.at(context, imu_stamp_ns));
             self.warn_of_joint_angles(stamp_ns, joint_angles.is_some());
@@ -152,6 +156,7 @@ impl FrameSource {
                 image,
                 imu,
                 imu_after,
+                gimbal_imu,
                 joint_angles,
                 ground_truth,
                 warnings: std::mem::take(&mut self.context.warnings),
@@ -164,6 +169,9 @@ impl FrameSource {
         self.warn_of_skipped_images();
         self.imu.finish(&mut self.context);
         self.imu_gaps.finish(&mut self.context);
+        if let Some(imu) = &mut self.gimbal_imu {
+            imu.finish(&mut self.context);
+        }
         self.camera.finish(&mut self.context);
         if self.end_ns == i64::MAX {
             self.context.warnings.extend(self.log_warnings.drain(..));
@@ -189,7 +197,7 @@ impl FrameSource {
     }
 
     fn read_imu_until(&mut self, stamp_ns: i64) {
-        while !self.imu_ended && self.samples.back().is_none_or(|last| last.stamp_ns < stamp_ns) {
+        while !self.imu_ended && self.buffer.samples.back().is_none_or(|last| last.stamp_ns < stamp_ns) {
             let Some(sample) = self.imu.next(&mut self.context) else {
                 self.imu_ended = true;
                 return;
@@ -198,36 +206,8 @@ impl FrameSource {
             if sample.angular_velocity_rad_per_s.norm() > ROTATING_RAD_PER_S {
                 self.rotating_ns = Some(sample.stamp_ns);
             }
-            self.samples.push_back(sample);
+            self.buffer.samples.push_back(sample);
         }
-    }
-
-    /// Drops samples that no later frame needs, except the last one before the stamp.
-    fn forget_samples_before(&mut self, stamp_ns: i64) {
-        while self.samples.get(1).is_some_and(|second| second.stamp_ns <= stamp_ns) {
-            self.samples.pop_front();
-        }
-    }
-
-    /// Removes and returns the samples from the previous frame's end to `end_ns`, both ends interpolated.
-    fn take_imu(&mut self, end_ns: i64) -> Vec<ImuSample> {
-        let start_ns = self.previous_end.map_or(end_ns - FIRST_FRAME_IMU_NS, |previous| previous.stamp_ns);
-        let mut imu: Vec<ImuSample> = self.previous_end.into_iter().collect();
-        let includes_start = imu.is_empty();
-        let inside =
-            |stamp_ns: i64| (stamp_ns > start_ns || (includes_start && stamp_ns == start_ns)) && stamp_ns < end_ns;
-        imu.extend(self.samples.iter().filter(|sample| inside(sample.stamp_ns)));
-        let after = self.samples.iter().position(|sample| sample.stamp_ns >= end_ns);
-        if let Some(after) = after {
-            let end = match after.checked_sub(1).and_then(|before| self.samples.get(before)) {
-                Some(before) => interpolate_imu(before, &self.samples[after], end_ns),
-                None => self.samples[after],
-            };
-            imu.push(end);
-            self.previous_end = Some(end);
-        }
-        self.forget_samples_before(end_ns);
-        imu
     }
 
     /// Samples from the end of the frame on, the first one interpolated there.
@@ -237,8 +217,8 @@ impl FrameSource {
         }
         let last_ns = end_ns.saturating_add(self.after_ns);
         self.read_imu_until(last_ns);
-        let following = self.samples.iter().filter(|sample| (end_ns + 1..=last_ns).contains(&sample.stamp_ns));
-        self.previous_end.iter().chain(following).copied().collect()
+        let following = self.buffer.samples.iter().filter(|sample| (end_ns + 1..=last_ns).contains(&sample.stamp_ns));
+        self.buffer.previous_end.iter().chain(following).copied().collect()
     }
 
     fn warn_of_skipped_images(&mut self) {
@@ -248,7 +228,7 @@ impl FrameSource {
                 "{}: {} before the first IMU sample at {:.3} s skipped",
                 self.camera.topic,
                 counted(count, "image"),
-                seconds_from_ns(self.samples.front().map_or(0, |first| first.stamp_ns))
+                seconds_from_ns(self.buffer.samples.front().map_or(0, |first| first.stamp_ns))
             );
             let warning = LogWarning::new(WarningKind::ImageBeforeImu, &self.camera.topic, self.start_ns, message);
             self.context.warnings.push(warning.with_count(count, self.start_ns));
@@ -257,7 +237,7 @@ impl FrameSource {
 
     fn warn_of_imu_end(&mut self, stamp_ns: i64, number: usize) {
         let left = self.camera.count.saturating_sub(number);
-        let Some(last) = self.samples.back() else {
+        let Some(last) = self.buffer.samples.back() else {
             let message = format!("{}: no IMU sample for the images of {}", self.imu_topic, self.camera.key);
             self.context.warn(WarningKind::NoImu, &self.imu_topic, stamp_ns, message);
             return;
@@ -285,22 +265,6 @@ fn joint_topic(rig: &Rig, camera: &CameraRig) -> Option<String> {
 fn half_interval_ns(rig_rate_hz: f64, log_rate_hz: f64) -> i64 {
     let slower = [rig_rate_hz, log_rate_hz].into_iter().filter(|rate| *rate > 0.0).fold(f64::INFINITY, f64::min);
     if slower.is_finite() { ns_from_seconds(0.5 / slower) } else { i64::MAX }
-}
-
-fn fraction_at(from_ns: i64, to_ns: i64, stamp_ns: i64) -> f64 {
-    if to_ns > from_ns { (stamp_ns - from_ns) as f64 / (to_ns - from_ns) as f64 } else { 0.0 }
-}
-
-fn interpolate_imu(from: &ImuSample, to: &ImuSample, stamp_ns: i64) -> ImuSample {
-    let fraction = fraction_at(from.stamp_ns, to.stamp_ns, stamp_ns);
-    if fraction >= 1.0 {
-        return ImuSample { stamp_ns, ..*to };
-    }
-    ImuSample {
-        stamp_ns,
-        angular_velocity_rad_per_s: from.angular_velocity_rad_per_s.lerp(&to.angular_velocity_rad_per_s, fraction),
-        specific_force_m_per_s2: from.specific_force_m_per_s2.lerp(&to.specific_force_m_per_s2, fraction),
-    }
 }
 
 /// Joint angles of the gimbal, `None` without a gimbal or encoders.

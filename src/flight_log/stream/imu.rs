@@ -45,7 +45,12 @@ struct Measured<T> {
 impl ImuStream {
     /// Reads from a stamp on.
     pub(super) fn new(log: &FlightLog, rig: &ImuRig, from_ns: i64) -> Result<Self, LogError> {
-        log.require_topic("imu0.rostopic", &rig.topic, &[MessageKind::Imu])?;
+        Self::of_key(log, "imu0", rig, from_ns)
+    }
+
+    /// [`Self::new`] for the IMU with a key of the rig.
+    pub(super) fn of_key(log: &FlightLog, key: &str, rig: &ImuRig, from_ns: i64) -> Result<Self, LogError> {
+        log.require_topic(&format!("{key}.rostopic"), &rig.topic, &[MessageKind::Imu])?;
         let clock = StampClock::of_rig(rig.use_log_time);
         let Some(accelerometer) = &rig.accelerometer_topic else {
             let decoder = sample_decoder(log.epoch_ns(), clock, has_forces(log, &rig.topic));

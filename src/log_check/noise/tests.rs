@@ -89,6 +89,7 @@ fn rig() -> Rig {
             },
             intrinsics: ImuIntrinsics::default(),
         },
+        gimbal_imu: None,
         cameras: Vec::new(),
         gimbal: None,
         ground_truth_topic: None,

@@ -31,6 +31,7 @@ pub(super) fn experiment_scenario(experiment: Experiment, seed: u64, duration_s:
         camera_time_offset_s: 0.0,
         readout_s: 0.0,
         encoder_sigma_rad: gimbal_camera.then_some(0.01),
+        gimbal_imu: false,
     };
     let options =
         ScenarioOptions { name: "test", seed, equipment, start_error: experiment.start_error(), imu_noise_scale: 1.0 };

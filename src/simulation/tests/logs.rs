@@ -48,6 +48,38 @@ fn a_simulated_log_reads_back_with_its_rig_and_ground_truth() {
 }
 
 #[test]
+fn an_imu_on_the_gimbal_is_added_without_changing_the_other_sensors() {
+    let (folder, other) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let plain = write(&small(Experiment::T3), other.path());
+    let mut options = SimulationOptions { gimbal_imu_noise_scale: Some(1.0), ..small(Experiment::T3) };
+    options.disturbances.set("gimbal-imu-error=0.01,0.02").unwrap();
+    let summary = write(&options, folder.path());
+    let frames = |summary: &SimulationSummary| {
+        let log = Arc::new(FlightLog::open(&summary.log).unwrap());
+        let rig = Rig::for_log(&log, None).unwrap();
+        let frames: Vec<_> = FrameStream::new(Arc::clone(&log), &rig, "cam0", 0.0, None).unwrap().collect();
+        (frames, rig, Rig::ground_truth_for_log(&log, None).unwrap().unwrap())
+    };
+    let (without, rig, _) = frames(&plain);
+    assert!(rig.gimbal_imu.is_none() && without.iter().all(|frame| frame.gimbal_imu.is_empty()));
+    let (with, rig, truth) = frames(&summary);
+    assert_eq!(with.len(), without.len());
+    for (with, without) in with.iter().zip(&without) {
+        assert_eq!((&with.imu, &with.joint_angles, &with.image), (&without.imu, &without.joint_angles, &without.image));
+    }
+    for frame in &with[1..] {
+        let (own, imu) = (&frame.gimbal_imu, &frame.imu);
+        assert!(own.len() >= 11, "{} samples", own.len());
+        assert_eq!(own.first().map(|it| it.stamp_ns), imu.first().map(|it| it.stamp_ns));
+        assert_eq!(own.last().map(|it| it.stamp_ns), imu.last().map(|it| it.stamp_ns));
+    }
+    let (given, truth) = (rig.gimbal_imu.unwrap(), truth.gimbal_imu.unwrap());
+    assert_eq!((given.timeshift_s, truth.timeshift_s), (0.0, 0.01));
+    let angle = given.camera_from_imu.rotation.angle_to(&truth.camera_from_imu.rotation);
+    assert!((0.002..0.1).contains(&angle), "{angle} rad");
+}
+
+#[test]
 fn the_same_options_give_the_same_bytes_whatever_the_thread_count() {
     let options = small(Experiment::T1);
     let read = |threads: usize, seed: u64| {

@@ -10,6 +10,9 @@ use crate::sensors::BodyAxes;
 const USUAL_FIELD_OF_VIEW_DEG: f64 = 84.0;
 /// Mechanism of an unknown gimbal: the usual order of three axes.
 const USUAL_MECHANISM: &str = "yaw-roll-pitch";
+/// Topics of the IMU in a video's telemetry, alone or the first of several.
+const CAMERA_IMU: &str = "/camera/imu";
+const CAMERA_IMU_0: &str = "/camera/imu0";
 /// `GoPro` cameras by the first letters of their firmware.
 const FIRMWARES: [(&str, &str); 8] = [
     ("HD3", "hero3"),
@@ -93,6 +96,12 @@ impl VideoFacts {
             imu_axes: if self.has_autopilot { Some(frd) } else { (!self.has_unknown_axes).then_some(flu) },
             position_m: None,
             imu_topic: imu,
+            // The video's own IMU moves with the camera on the gimbal; its axes are those of the camera, as converted.
+            gimbal_imu_topic: [CAMERA_IMU, CAMERA_IMU_0]
+                .into_iter()
+                .find(|topic| self.has_autopilot && log.topic(topic).is_some())
+                .map(str::to_owned),
+            gimbal_imu_axes: Some(flu),
             image_topic: Some(VIDEO_TOPIC.to_owned()),
             joint_topic: None,
             joint_names: Vec::new(),

@@ -20,8 +20,8 @@ use nalgebra::Vector3;
 use crate::camera::CameraModel;
 use crate::gimbal::ClassicalChain;
 use crate::sensors::{
-    AssumedField, AttitudeSource, BodyAxes, CameraMount, CameraRig, ChainPrior, GimbalRig, ImuIntrinsics, ImuNoise,
-    ImuRig, IntrinsicsSigma, Joint, Rig,
+    AssumedField, AttitudeSource, BodyAxes, CameraMount, CameraRig, ChainPrior, GimbalImuRig, GimbalRig, ImuIntrinsics,
+    ImuNoise, ImuRig, IntrinsicsSigma, Joint, Rig,
 };
 
 /// Standard deviations of intrinsics from a field of view: of the focal length as a ratio (manufacturers round, crop
@@ -149,6 +149,8 @@ pub struct RigTemplate {
     pub described: Option<DescribedChain>,
     /// `None` for a rigid camera; it looks forward if its pose is not described.
     pub gimbal: Option<GimbalTemplate>,
+    /// IMU in the camera's housing, with its axes in the camera (forward is its viewing direction); only with a gimbal.
+    pub gimbal_imu: Option<ImuTemplate>,
     /// Position of the gimbal, or of the rigid camera: forward, left and up of the IMU, in metres.
     pub position_m: Sourced<Vector3<f64>>,
     /// Topic of the ground-truth pose of the IMU in the world.
@@ -178,6 +180,7 @@ impl RigTemplate {
                 noise: self.imu.noise.value,
                 intrinsics: ImuIntrinsics::default(),
             },
+            gimbal_imu: self.gimbal_imu.as_ref().map(gimbal_imu_rig),
             cameras: vec![CameraRig {
                 key: "cam0".to_owned(),
                 mount,
@@ -248,6 +251,11 @@ impl RigTemplate {
         add("imu0.rostopic", self.imu.topic.assumed.clone());
         add("imu0.accelerometer_noise_density", self.imu.noise.assumed.clone());
         add("imu0.gyroscope_noise_density", self.imu.noise.assumed.clone());
+        if let Some(imu) = &self.gimbal_imu {
+            add("imu1.accelerometer_noise_density", imu.noise.assumed.clone());
+            add("imu1.gyroscope_noise_density", imu.noise.assumed.clone());
+            add("imu1.T_cam_imu", imu.axes.assumed.clone());
+        }
         add("cam0.rostopic", self.camera.topic.assumed.clone());
         add("cam0.intrinsics", self.camera.model.assumed.clone());
         add("cam0.timeshift_cam_imu", self.camera.timeshift_cam_imu_s.assumed.clone());
@@ -285,5 +293,23 @@ impl RigTemplate {
         add("gimbal.links", both(&Some(meeting), &gimbal.positive.assumed));
         add("gimbal.T_E_C", Some("the camera's centre is at the intersection of the axes".to_owned()));
         fields
+    }
+}
+
+/// IMU at the centre of the camera with axes parallel to its own.
+fn gimbal_imu_rig(imu: &ImuTemplate) -> GimbalImuRig {
+    let imu_from_camera = MechanismAxes(Vec::new()).chain(imu.axes.value, imu.axes.value, Vector3::zeros());
+    GimbalImuRig {
+        sensor: ImuRig {
+            topic: imu.topic.value.clone(),
+            accelerometer_topic: imu.accelerometer_topic.clone(),
+            use_log_time: false,
+            frame_id: "gimbal_imu".to_owned(),
+            rate_hz: imu.rate_hz,
+            noise: imu.noise.value,
+            intrinsics: ImuIntrinsics::default(),
+        },
+        camera_from_imu: imu_from_camera.imu_from_base.inverse(),
+        timeshift_s: 0.0,
     }
 }

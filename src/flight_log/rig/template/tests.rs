@@ -20,12 +20,39 @@ fn choices(mechanism: &str, camera: &str) -> RigChoices {
         imu_axes: None,
         position_m: None,
         imu_topic: None,
+        gimbal_imu_topic: None,
+        gimbal_imu_axes: None,
         image_topic: None,
         joint_topic: None,
         joint_names: Vec::new(),
         attitude: None,
         noise: None,
     }
+}
+
+#[test]
+fn an_imu_in_the_cameras_housing_becomes_the_second_one() {
+    for (axes, y, z) in [(Some(BodyAxes::Frd), Vector3::x(), Vector3::y()), (None, -Vector3::x(), -Vector3::y())] {
+        let choices = RigChoices {
+            gimbal_imu_topic: Some("/camera/imu".to_owned()),
+            gimbal_imu_axes: axes,
+            ..choices("yaw-roll-pitch", "fov:84")
+        };
+        let template = RigTemplate::new(&choices, None).unwrap();
+        let imu = template.rig().gimbal_imu.unwrap();
+        assert_eq!(imu.sensor.topic, "/camera/imu");
+        // Optical axes: x right, y down, z forward.
+        for (axis, expected) in [(Vector3::x(), Vector3::z()), (Vector3::y(), y), (Vector3::z(), z)] {
+            let found = imu.camera_from_imu.rotation * axis;
+            assert!((found - expected).norm() < 1e-9, "{axes:?}: {axis} is {found}");
+        }
+        let fields = template.assumed_fields();
+        assert!(fields.iter().any(|assumed| assumed.field == "imu1.T_cam_imu"), "{fields:?}");
+        let read = Rig::from_yaml(&template.to_yaml(), Path::new("new.rig.yaml")).unwrap();
+        assert_eq!(read.gimbal_imu.map(|imu| imu.sensor), Some(imu.sensor));
+    }
+    let rigid = RigChoices { gimbal_imu_topic: Some("/camera/imu".to_owned()), ..choices("rigid", "fov:84") };
+    assert_eq!(RigTemplate::new(&rigid, None).unwrap().rig().gimbal_imu, None);
 }
 
 fn template(mechanism: &str, camera: &str) -> RigTemplate {

@@ -38,6 +38,8 @@ impl RigTemplate {
             "imu0.accelerometer_noise_density" => {
                 "m/s²/√Hz, m/s³/√Hz, rad/s/√Hz, rad/s²/√Hz; larger than in the data sheet, since airframes vibrate."
             }
+            "imu1" => "IMU that moves with the camera of the gimbal.",
+            "imu1.T_cam_imu" => "Kalibr's direction: maps points from this IMU to the camera.",
             "cam0.intrinsics" => "fx fy cx cy in pixels; a calibration with a target also gives the distortion.",
             "cam0.intrinsics_sigma" => {
                 "Standard deviations: relative of fx and fy, in pixels of cx and cy, of each distortion coefficient."

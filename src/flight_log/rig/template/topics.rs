@@ -43,6 +43,10 @@ pub struct RigChoices {
     pub position_m: Option<Vector3<f64>>,
     /// Topic of the IMU, `None` for the log's only one.
     pub imu_topic: Option<String>,
+    /// Topic of an IMU in the camera's housing on a gimbal, `None` without one.
+    pub gimbal_imu_topic: Option<String>,
+    /// Its axes in the camera, forward being the viewing direction; `None` if unknown.
+    pub gimbal_imu_axes: Option<BodyAxes>,
     /// Topic of the images, `None` for the log's only one.
     pub image_topic: Option<String>,
     /// Topic of the joint angles, `None` for the log's only one.
@@ -82,8 +86,10 @@ impl RigTemplate {
             || Sourced::assumed(Vector3::zeros(), nothing_known),
             |position_m| Sourced::assumed(position_m, "position measured by hand"),
         );
+        let gimbal_imu = choices.gimbal_imu_topic.as_ref().filter(|_| !is_rigid);
         Ok(Self {
             name: choices.name.clone(),
+            gimbal_imu: gimbal_imu.map(|topic| gimbal_imu_of(topic, choices, log)).transpose()?,
             imu,
             camera,
             described: choices.described.clone(),
@@ -175,6 +181,19 @@ fn imu(choices: &RigChoices, log: Option<&FlightLog>) -> Result<ImuTemplate, Tem
         axes: imu_axes(choices, force),
         noise,
     })
+}
+
+/// IMU in the camera's housing on this topic.
+fn gimbal_imu_of(topic: &str, choices: &RigChoices, log: Option<&FlightLog>) -> Result<ImuTemplate, TemplateError> {
+    let of_log = RigChoices { imu_topic: Some(topic.to_owned()), imu_axes: choices.gimbal_imu_axes, ..choices.clone() };
+    let (axes, given) = (choices.gimbal_imu_axes.unwrap_or(BodyAxes::Flu), choices.gimbal_imu_axes.is_some());
+    let reason = format!(
+        "{}IMU assumed at the camera's centre with axes parallel to the camera's: x in viewing direction, y {}, z {}",
+        if given { "" } else { "axes unknown; " },
+        if axes == BodyAxes::Flu { "left" } else { "right" },
+        if axes == BodyAxes::Flu { "up" } else { "down" },
+    );
+    Ok(ImuTemplate { axes: Sourced::assumed(axes, reason), ..imu(&of_log, log)? })
 }
 
 /// Mean of the first specific forces.

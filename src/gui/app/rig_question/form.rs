@@ -78,6 +78,8 @@ impl RigForm {
             imu_axes: self.imu_axes,
             position_m: self.position_is_measured.then(|| self.position_m.into()),
             imu_topic: self.topics.imu_choice(),
+            gimbal_imu_topic: None,
+            gimbal_imu_axes: None,
             image_topic: self.topics.image.clone(),
             joint_topic: if let AngleField::Joints(topic) = angles { Some(topic.clone()) } else { None },
             joint_names: Vec::new(),
