@@ -260,6 +260,7 @@ fn priors(input: &CalibrationInput, options: &CalibrationOptions, navigation: &[
             bias: ImuBias::default(),
             gyroscope_bias_sigma: Vector3::repeat(options.bias_sigmas.0),
             accelerometer_bias_sigma: Vector3::repeat(options.bias_sigmas.1),
+            gimbal_bias_sigmas: None,
         },
     }
 }

@@ -37,6 +37,7 @@ impl InitialTrajectory {
             stamp_ns: view.stamp_ns,
             imu: &view.imu,
             imu_after: &[],
+            gimbal_imu: &[],
             joint_angles: None,
             tracks: &view.tracks,
             rigid_tracks: &[],

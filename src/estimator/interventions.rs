@@ -25,10 +25,12 @@ pub enum SensorParameters {
     Readout,
     Intrinsics,
     ImuIntrinsics,
+    /// Orientation and time offset of the IMU on the gimbal.
+    GimbalImu,
 }
 
 impl SensorParameters {
-    pub const ALL: [Self; 4] = [Self::Timeshift, Self::Readout, Self::Intrinsics, Self::ImuIntrinsics];
+    pub const ALL: [Self; 5] = [Self::Timeshift, Self::Readout, Self::Intrinsics, Self::ImuIntrinsics, Self::GimbalImu];
 
     /// Key in the specification of a run.
     pub const fn key(self) -> &'static str {
@@ -37,6 +39,7 @@ impl SensorParameters {
             Self::Readout => "readout",
             Self::Intrinsics => "intrinsics",
             Self::ImuIntrinsics => "imu-intrinsics",
+            Self::GimbalImu => "gimbal-imu-axes",
         }
     }
 }
@@ -77,6 +80,7 @@ impl Estimator {
             SensorParameters::Readout => config.estimate_readout = true,
             SensorParameters::Intrinsics => config.estimate_intrinsics = true,
             SensorParameters::ImuIntrinsics => config.estimate_imu_intrinsics = true,
+            SensorParameters::GimbalImu => config.estimate_gimbal_imu = true,
         }
         match &mut self.phase {
             PhaseState::Tracking(window) => window.state.add_columns(&self.setup),

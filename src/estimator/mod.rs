@@ -30,7 +30,7 @@ pub use factors::{FactorKind, imu as imu_factor};
 pub use interventions::{InterventionError, SensorParameters};
 pub use packed::PackedEstimator;
 pub use problem::hypothetical::{
-    HypotheticalFrame, HypotheticalLandmark, HypotheticalWindow, JointKnowledge, PoseKnowledge,
+    HypotheticalCameraImu, HypotheticalFrame, HypotheticalLandmark, HypotheticalWindow, JointKnowledge, PoseKnowledge,
 };
 pub use problem::information_gain::{InformationGain, Motion};
 pub use problem::linearization::Linearization;
@@ -43,6 +43,7 @@ pub use report::{
 pub use state::allocation::allocated_bytes;
 pub use state::columns::{ColumnBlock, ColumnGroup, ColumnId, FrameId};
 pub use state::earlier_pass::{BiasPrior, EarlierPass};
+pub use state::gimbal_imu::GimbalImuState;
 pub use state::preintegration::{self, ImuBias, MotionIncrement, NavigationState, Preintegration};
 pub use step_input::{StepInput, StepMeasurements};
 pub use window::setup::gravity_in_world;

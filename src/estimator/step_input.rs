@@ -13,6 +13,9 @@ pub struct StepInput<'a> {
     /// IMU samples after the stamp (the first one at the stamp) while the rows of a rolling shutter are exposed; empty
     /// if no run needs them.
     pub imu_after: &'a [ImuSample],
+    /// Samples of the IMU on the gimbal over the interval of `imu`, both ends included and interpolated; empty without
+    /// one, or where they are missing.
+    pub gimbal_imu: &'a [ImuSample],
     /// Encoder angles at the stamp with their standard deviations, `None` without encoders.
     pub joint_angles: Option<&'a JointAngles>,
     /// Tracked features of the main camera; empty if it has no image in this frame set.
@@ -49,6 +52,8 @@ pub trait StepMeasurements {
     fn stamp_ns(&self) -> i64;
     /// The IMU samples, as in [`StepInput`].
     fn imu(&self) -> &[ImuSample];
+    /// Samples of the IMU on the gimbal, as in [`StepInput`].
+    fn gimbal_imu(&self) -> &[ImuSample];
     /// Features of a camera, ordered by id; index 0 is the main camera.
     fn features(&self, camera: usize) -> &[TrackedFeature];
 }

@@ -53,6 +53,8 @@ pub enum ParameterPart {
     Gyroscope,
     /// Intrinsics of the accelerometer; its axes define those of the IMU.
     Accelerometer,
+    /// Orientation of the IMU on the gimbal in the camera's frame relative to the rig's, and its clock.
+    GimbalImu,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -127,6 +129,8 @@ impl ParameterId {
 
     pub const ENCODER_TIMESHIFT: Self = Self { part: ParameterPart::Encoder, quantity: Quantity::Timeshift };
 
+    pub const GIMBAL_IMU_TIMESHIFT: Self = Self { part: ParameterPart::GimbalImu, quantity: Quantity::Timeshift };
+
     /// Readout time of a camera's rolling shutter.
     pub const fn readout(camera: u8) -> Self {
         Self { part: ParameterPart::Camera(camera), quantity: Quantity::Readout }
@@ -152,7 +156,9 @@ impl ParameterId {
         match (self.part, self.quantity) {
             (_, Quantity::Timeshift | Quantity::Readout) => ParameterGroup::Clocks,
             (ParameterPart::Camera(_), _) => ParameterGroup::Camera,
-            (ParameterPart::Gyroscope | ParameterPart::Accelerometer, _) => ParameterGroup::Imu,
+            (ParameterPart::Gyroscope | ParameterPart::Accelerometer | ParameterPart::GimbalImu, _) => {
+                ParameterGroup::Imu
+            }
             _ => ParameterGroup::Chain,
         }
     }
@@ -215,6 +221,7 @@ impl ParameterPart {
             Self::Encoder => matches!(quantity, Timeshift),
             Self::Gyroscope => matches!(quantity, Sx | Sy | Sz | Mxy | Mxz | Myz | Rx | Ry | Rz),
             Self::Accelerometer => matches!(quantity, Sx | Sy | Sz | Mxy | Mxz | Myz),
+            Self::GimbalImu => matches!(quantity, Rx | Ry | Rz | Timeshift),
         }
     }
 }
@@ -322,6 +329,7 @@ impl ParameterNames {
             ParameterPart::Encoder => "encoder".to_owned(),
             ParameterPart::Gyroscope => "gyroscope".to_owned(),
             ParameterPart::Accelerometer => "accelerometer".to_owned(),
+            ParameterPart::GimbalImu => "imu1".to_owned(),
         }
     }
 
@@ -371,6 +379,7 @@ impl ParameterNames {
                 "encoder" => ParameterPart::Encoder,
                 "gyroscope" => ParameterPart::Gyroscope,
                 "accelerometer" => ParameterPart::Accelerometer,
+                "imu1" => ParameterPart::GimbalImu,
                 _ => match number("L") {
                     Some(link) => ParameterPart::Link(link.checked_sub(1)?),
                     None => ParameterPart::Exponential(number("X")?),
@@ -423,6 +432,8 @@ mod tests {
                     parameters.extend(Quantity::SCALE_MISALIGNMENT.map(of(sensor)));
                 }
                 parameters.push(ParameterId { part: ParameterPart::Gyroscope, quantity: Quantity::Rx });
+                parameters.push(ParameterId { part: ParameterPart::GimbalImu, quantity: Quantity::Rx });
+                parameters.push(ParameterId::GIMBAL_IMU_TIMESHIFT);
                 parameters.extend(
                     Quantity::TRANSFORM.map(|quantity| ParameterId { part: ParameterPart::ImuFromCamera(1), quantity }),
                 );

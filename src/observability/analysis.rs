@@ -213,7 +213,7 @@ fn nuisance_blocks(linearization: &Linearization) -> Vec<Range<usize>> {
         blocks.sort_by_key(|block| (Reverse(block.id.frame()), block.start));
         blocks.into_iter().map(|block| block.start..block.start + block.len)
     };
-    let mut blocks: Vec<_> = of(&[ColumnGroup::VelocityBias]).collect();
+    let mut blocks: Vec<_> = of(&[ColumnGroup::VelocityBias, ColumnGroup::GimbalImu]).collect();
     blocks.extend(of(&[ColumnGroup::InverseDepth]));
     blocks.extend(of(&[ColumnGroup::Joints, ColumnGroup::Pose]));
     blocks

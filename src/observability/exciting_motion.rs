@@ -18,6 +18,7 @@ impl RankReport {
 /// test of the laboratory's table of motions checks it against predicted standard deviations.
 pub fn exciting_motion(parameter: ParameterId) -> Option<&'static str> {
     let words = match (parameter.part, parameter.quantity) {
+        (ParameterPart::GimbalImu, _) => "rotate the camera about all its axes, back and forth",
         (ParameterPart::Encoder, Quantity::Timeshift) => "move the joints back and forth",
         (_, Quantity::Timeshift | Quantity::Readout) => "rotate the camera back and forth",
         (_, Quantity::Fx) => "rotate the camera about its vertical image axis",

@@ -198,6 +198,7 @@ fn measure(
             stamp_ns: view.stamp_ns,
             imu: &view.imu,
             imu_after: &[],
+            gimbal_imu: &[],
             joint_angles: view.joint_angles.as_ref(),
             tracks: &view.tracks,
             rigid_tracks: &[],

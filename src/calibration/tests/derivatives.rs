@@ -52,6 +52,7 @@ fn example() -> Example {
             bias: ImuBias::default(),
             gyroscope_bias_sigma: Vector3::repeat(0.05),
             accelerometer_bias_sigma: Vector3::repeat(0.5),
+            gimbal_bias_sigmas: None,
         },
     };
     let joint = |frame_set: &FrameSet| {

@@ -8,7 +8,9 @@ use crate::estimator::state::earlier_pass::EarlierPass;
 use crate::estimator::state::imu_errors::{self, ImuErrors};
 use crate::geometry::RigidTransform;
 use crate::gimbal::{Chain, ClassicalChain, ParameterId, Parameterization};
-use crate::sensors::{CameraMount, CameraRig, ImuIntrinsics, ImuNoise, IntrinsicsSigma, Rig, UnknownCamera};
+use crate::sensors::{
+    CameraMount, CameraRig, GimbalImuRig, ImuIntrinsics, ImuNoise, IntrinsicsSigma, Rig, UnknownCamera,
+};
 
 #[derive(Clone, Debug)]
 pub struct EstimatorConfig {
@@ -40,6 +42,10 @@ pub struct EstimatorConfig {
     pub estimate_imu_intrinsics: bool,
     /// Rig's intrinsics of the IMU; samples are already corrected by them.
     pub imu_intrinsics: ImuIntrinsics,
+    /// IMU on the gimbal of the main camera, `None` without one or if it is not used.
+    pub gimbal_imu: Option<GimbalImuRig>,
+    /// Estimate orientation and time offset of the IMU on the gimbal; requires `calibrate`.
+    pub estimate_gimbal_imu: bool,
     /// Shutter of the main camera, and the uncertainty of its intrinsics.
     pub sensor: CameraSensorPrior,
     /// Given time offset of the main camera, in seconds (`t_imu = t_cam + shift`); stamps already include it.
@@ -163,6 +169,8 @@ impl EstimatorConfig {
             estimate_intrinsics: false,
             estimate_imu_intrinsics: false,
             imu_intrinsics: rig.imu.intrinsics,
+            gimbal_imu: gimbal.and_then(|_| rig.gimbal_imu.clone()),
+            estimate_gimbal_imu: false,
             sensor: CameraSensorPrior::of_rig(camera),
             timeshift_s: camera.timeshift_cam_imu_s,
             rigid_cameras: Vec::new(),

@@ -98,6 +98,7 @@ impl<'a> Writer<'a> {
             joints,
             joint_motion: first.map_or(0, |state| state.joint_motion.len()),
             moving_rows: first.is_some_and(FrameState::has_moving_rows),
+            gimbal_imu: report.window.first().and_then(|frame| frame.gimbal_imu).map_or(0, |_| VELOCITY_BIAS),
             calibration: if source.calibrated { report.calibration.parameters.len() } else { 0 },
         };
         let numbers: Vec<FrameId> = report.window.iter().map(|frame| FrameId(frame.frame_index)).collect();

@@ -7,6 +7,7 @@ use crate::estimator::state::estimate::Estimate;
 use crate::estimator::state::frame::Frame;
 use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::state::layout::Layout;
+use crate::geometry::RigidTransform;
 
 /// A factor of the least-squares problem: whitened residuals with their derivatives by columns of the layout.
 ///
@@ -84,6 +85,10 @@ pub(crate) struct Point<'a> {
     pub(crate) frames: &'a [Frame],
     /// Gravity in the world frame, in m/s².
     pub(crate) gravity_in_world: &'a Vector3<f64>,
+    /// Rig's `camera_from_imu1` of the IMU on the gimbal, `None` without one.
+    pub(crate) camera_from_gimbal_imu: Option<&'a RigidTransform>,
+    /// True if derivatives by the calibration are evaluated at its first estimate.
+    pub(crate) calibration_first_estimates: bool,
     /// Estimate at which residuals are evaluated.
     pub(crate) at: &'a Estimate,
     /// States at which derivatives are evaluated, by slot.

@@ -16,6 +16,8 @@ pub enum FactorKind {
     MarginalizationPrior,
     /// Zero-velocity update of a stationary vehicle.
     ZeroVelocity,
+    /// Preintegrated samples of the IMU on the gimbal between two frames.
+    GimbalImu,
 }
 
 /// Keys in tables and conditions, without spaces.
@@ -27,6 +29,7 @@ impl Named for FactorKind {
         (Self::CalibrationPrior, "calibration_prior"),
         (Self::MarginalizationPrior, "marginalization_prior"),
         (Self::ZeroVelocity, "standstill"),
+        (Self::GimbalImu, "gimbal_imu"),
     ];
 }
 
@@ -40,6 +43,7 @@ impl FactorKind {
             Self::CalibrationPrior => "calibration prior",
             Self::MarginalizationPrior => "marginalization prior",
             Self::ZeroVelocity => "zero velocity",
+            Self::GimbalImu => "gimbal IMU",
         }
     }
 }
@@ -49,6 +53,8 @@ impl FactorKind {
 pub(crate) enum FactorLabel {
     /// IMU samples that end at this slot.
     Imu(u16),
+    /// Samples of the IMU on the gimbal that end at this slot.
+    GimbalImu(u16),
     /// Encoder readings of the frame at this slot, with its joint rates and joint accelerations.
     Encoder(u16),
     ZeroVelocity,
@@ -61,6 +67,7 @@ impl FactorLabel {
     pub(crate) const fn kind(self) -> FactorKind {
         match self {
             Self::Imu(_) => FactorKind::Imu,
+            Self::GimbalImu(_) => FactorKind::GimbalImu,
             Self::Encoder(_) => FactorKind::Encoder,
             Self::ZeroVelocity => FactorKind::ZeroVelocity,
             Self::CalibrationPrior => FactorKind::CalibrationPrior,

@@ -2,12 +2,13 @@
 
 use super::encoder::EncoderFactor;
 use super::factor::{Point, Sink};
+use super::gimbal_imu::{GimbalImuFactor, GimbalImuStates};
 use super::imu::ImuFactor;
 use super::joint_motion::JointMotionFactor;
 use super::zero_velocity::ZeroVelocityFactor;
 
 /// Passes the measurements of the frames before `slots` to a sink.
-pub(crate) fn measurements(point: &Point<'_>, slots: usize, sink: &mut impl Sink) {
+pub(crate) fn measurements<S: Sink>(point: &Point<'_>, slots: usize, sink: &mut S) {
     for slot in 1..slots {
         sink.take(ImuFactor::of(point, slot));
     }
@@ -17,5 +18,10 @@ pub(crate) fn measurements(point: &Point<'_>, slots: usize, sink: &mut impl Sink
     }
     for slot in 0..slots {
         sink.take(ZeroVelocityFactor::of(point, slot));
+    }
+    if let Some(states) = GimbalImuStates::new(point, slots, S::DERIVATIVES) {
+        for slot in 1..slots {
+            sink.take(GimbalImuFactor::of(point, &states, slot));
+        }
     }
 }

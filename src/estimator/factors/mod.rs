@@ -9,6 +9,7 @@ pub(crate) mod costs;
 pub(crate) mod dense_equations;
 pub(crate) mod encoder;
 pub(crate) mod factor;
+pub(crate) mod gimbal_imu;
 pub mod imu;
 pub(crate) mod joint_motion;
 pub(crate) mod kind;

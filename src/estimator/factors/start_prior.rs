@@ -2,7 +2,8 @@
 
 use nalgebra::{SMatrix, SVector, Vector3};
 
-use super::factor::{Factor, NavigationColumns, Point, Sink, WhitenedRows};
+use super::encoder::diagonal;
+use super::factor::{Factor, JacobianBlock, NavigationColumns, Point, Sink, WhitenedRows};
 use super::kind::FactorLabel;
 use crate::estimator::state::navigation::{ImuBias, NavigationState};
 use crate::geometry::{RigidTransform, so3};
@@ -18,6 +19,9 @@ pub(crate) struct StartPrior {
     pub(crate) accelerometer_bias_sigma: Vector3<f64>,
     /// Standard deviation of the gyroscope bias by axis, in rad/s.
     pub(crate) gyroscope_bias_sigma: Vector3<f64>,
+    /// Standard deviations of the biases of an IMU on the gimbal, with mean zero: gyroscope in rad/s, accelerometer in
+    /// m/s²; `None` without one.
+    pub(crate) gimbal_bias_sigmas: Option<[f64; 2]>,
 }
 
 /// Standard deviation of the first position, in metres: only fixes the origin.
@@ -68,5 +72,39 @@ impl Factor for StartPriorFactor<'_> {
         }
         let blocks = self.columns.blocks(jacobian.as_slice());
         sink.add(self.label(), &WhitenedRows { residual: residual.as_slice(), blocks: &blocks, products: None });
+    }
+}
+
+/// [`StartPrior`] on the biases of the IMU on the gimbal in the oldest frame: six rows `[b_g, b_a]`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct GimbalImuStartFactor<'a> {
+    sigmas: [f64; 2],
+    bias: &'a ImuBias,
+    /// Column of the first bias.
+    start: usize,
+}
+
+impl<'a> GimbalImuStartFactor<'a> {
+    /// Factor of the window, `None` without such an IMU.
+    pub(crate) fn of(prior: &StartPrior, point: &Point<'a>) -> Option<Self> {
+        let own = point.at.frames.first()?.gimbal_imu.as_ref()?;
+        // The biases follow the velocity.
+        Some(Self { sigmas: prior.gimbal_bias_sigmas?, bias: &own.bias, start: point.layout.gimbal_imu(0).start + 3 })
+    }
+}
+
+impl Factor for GimbalImuStartFactor<'_> {
+    fn label(&self) -> FactorLabel {
+        FactorLabel::MarginalizationPrior
+    }
+
+    fn rows<S: Sink>(&self, sink: &mut S) {
+        let biases = [&self.bias.gyroscope_rad_per_s, &self.bias.accelerometer_m_per_s2];
+        let terms = biases.into_iter().zip(self.sigmas).flat_map(|(bias, sigma)| bias.iter().map(move |it| it / sigma));
+        let residual: Vec<f64> = terms.collect();
+        let slopes: Vec<f64> = self.sigmas.iter().flat_map(|sigma| [sigma.recip(); 3]).collect();
+        let entries = diagonal(slopes.into_iter());
+        let blocks = [JacobianBlock { start: self.start, entries: &entries }];
+        sink.add(self.label(), &WhitenedRows { residual: &residual, blocks: &blocks, products: None });
     }
 }

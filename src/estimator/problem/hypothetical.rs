@@ -16,11 +16,12 @@ use crate::estimator::state::columns::{ColumnBlock, ColumnGroup, FrameId};
 use crate::estimator::state::estimate::Estimate;
 use crate::estimator::state::frame::{Frame, layout};
 use crate::estimator::state::frame_state::{FrameState, Rates};
+use crate::estimator::state::gimbal_imu::GimbalImuState;
 use crate::estimator::state::given_chain::GivenSigmas;
-use crate::estimator::state::navigation::NavigationState;
+use crate::estimator::state::navigation::{ImuBias, NavigationState};
 use crate::estimator::state::preintegration::Preintegration;
 use crate::estimator::state::track::{Track, TrackObservation};
-use crate::geometry::ns_from_seconds;
+use crate::geometry::{RigidTransform, ns_from_seconds};
 use crate::gimbal::{ClassicalChain, Parameterization};
 use crate::optimization::{Landmark, LandmarkModel, RelativePose, RobustLoss};
 use crate::sensors::{ImuNoise, ImuSample, JointAngles, JointMotionFit};
@@ -57,6 +58,18 @@ pub struct HypotheticalFrame {
     pub joints_rad: Vec<f64>,
     /// IMU samples since the previous frame, both ends included; unused with known poses.
     pub imu: Vec<ImuSample>,
+    /// IMU at the centre of the camera, with its axes; `None` without one.
+    pub camera_imu: Option<HypotheticalCameraImu>,
+}
+
+/// Measurements of an IMU that moves with the camera; its biases are unknown.
+#[derive(Clone, Debug)]
+pub struct HypotheticalCameraImu {
+    pub noise: ImuNoise,
+    /// Velocity of the camera in the world.
+    pub velocity_m_per_s: Vector3<f64>,
+    /// Samples since the previous frame, both ends included.
+    pub samples: Vec<ImuSample>,
 }
 
 /// Landmark of a hypothetical window with the observing frames.
@@ -117,6 +130,11 @@ impl HypotheticalWindow {
             layout,
             cameras: vec![CameraFactors { visual, tracks: &tracks, columns: layout.calibration() }],
             gravity_in_world: self.gravity_in_world,
+            camera_from_gimbal_imu: self
+                .frames
+                .first()
+                .and_then(|first| first.camera_imu.as_ref())
+                .map(|_| RigidTransform::identity()),
             frames: &frames,
             prior: None,
             start: None,
@@ -160,9 +178,15 @@ impl HypotheticalWindow {
             navigation,
             joints_rad: hypothetical.joints_rad.clone(),
             joint_motion: Vec::new(),
+            gimbal_imu: hypothetical
+                .camera_imu
+                .as_ref()
+                .map(|imu| GimbalImuState { velocity_m_per_s: imu.velocity_m_per_s, bias: ImuBias::default() }),
             rates: Arc::new(Rates::default()),
         };
-        Frame::new(slot, ns_from_seconds(hypothetical.time_s), state, encoder, motion)
+        let of_camera = hypothetical.camera_imu.as_ref().filter(|_| slot > 0);
+        let of_camera = of_camera.map(|imu| Preintegration::from_samples(imu.noise, ImuBias::default(), &imu.samples));
+        Frame::new(slot, ns_from_seconds(hypothetical.time_s), state, encoder, motion).with_gimbal_motion(of_camera)
     }
 
     /// Landmarks with exact pixels; a frame into which a landmark does not project has no observation.

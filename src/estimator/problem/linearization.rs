@@ -25,7 +25,7 @@ use crate::gimbal::{Chain, ParameterId};
 /// row is dropped), so that the rows stay whitened residuals and no normal equations are formed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Linearization {
-    /// Column blocks in order: calibration, joints, poses, velocities and biases.
+    /// Column blocks in order: calibration, joints, poses, velocities and biases, the IMU on the gimbal.
     pub columns: Vec<ColumnBlock>,
     /// Calibration parameters fixed at their values; they have no columns.
     pub fixed_parameters: Vec<ParameterId>,
@@ -66,6 +66,9 @@ pub(crate) fn column_blocks(layout: &Layout, parameters: &[ParameterId], frames:
     for frame in frames {
         push(ColumnId::VelocityBias(*frame), VELOCITY_BIAS);
     }
+    for frame in frames {
+        push(ColumnId::GimbalImu(*frame), layout.gimbal_imu);
+    }
     blocks
 }
 
@@ -75,6 +78,7 @@ pub(crate) fn column_order(layout: &Layout) -> Vec<usize> {
     order.extend((0..layout.frames).flat_map(|slot| layout.joints(slot).start..layout.joint_motion(slot).end));
     order.extend((0..layout.frames).flat_map(|slot| layout.pose(slot)));
     order.extend((0..layout.frames).flat_map(|slot| layout.velocity_bias(slot)));
+    order.extend((0..layout.frames).flat_map(|slot| layout.gimbal_imu(slot)));
     order
 }
 
@@ -108,6 +112,14 @@ impl Problem<'_> {
         let point = self.point(estimate, &frames);
         let mut measured_rows = LabelledRows::new(layout.total());
         measurements(&point, layout.frames, &mut measured_rows);
+        let own = || measured_rows.parts.iter().filter(|part| part.label.kind() == FactorKind::GimbalImu);
+        if own().next().is_some() {
+            for (column, norm) in norms.iter_mut().enumerate().take(estimate.calibration.columns(MAIN).end) {
+                let of_part =
+                    |part: &LabelledPart| part.rows.column(layout.calibration().start + column).norm_squared();
+                *norm = own().map(of_part).sum::<f64>().sqrt().hypot(*norm);
+            }
+        }
         let imu = || measured_rows.parts.iter().filter(|part| part.label.kind() == FactorKind::Imu);
         let squared = |column: usize| imu().map(|part| part.rows.column(column).norm_squared()).sum::<f64>();
         let imu_columns = estimate.calibration.imu_columns();

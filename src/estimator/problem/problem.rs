@@ -14,7 +14,7 @@ use crate::estimator::factors::measurements::measurements;
 use crate::estimator::factors::reprojection::{
     self, ReducedVisualEquations, VisualEquations, VisualFactors, VisualModel,
 };
-use crate::estimator::factors::start_prior::{StartPrior, StartPriorFactor};
+use crate::estimator::factors::start_prior::{GimbalImuStartFactor, StartPrior, StartPriorFactor};
 use crate::estimator::state::calibrations::Calibrations;
 use crate::estimator::state::camera_pose::CameraMaps;
 use crate::estimator::state::camera_view::CameraView;
@@ -23,6 +23,7 @@ use crate::estimator::state::frame::Frame;
 use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::state::layout::Layout;
 use crate::estimator::state::track::Track;
+use crate::geometry::RigidTransform;
 use crate::optimization::Landmark;
 
 #[derive(Clone, Debug)]
@@ -39,6 +40,8 @@ pub(crate) struct Problem<'a> {
     /// Cameras have no common features, so each has a separate visual system.
     pub(crate) cameras: Vec<CameraFactors<'a>>,
     pub(crate) gravity_in_world: Vector3<f64>,
+    /// Rig's `camera_from_imu1` of the IMU on the gimbal, `None` without one.
+    pub(crate) camera_from_gimbal_imu: Option<RigidTransform>,
     pub(crate) frames: &'a [Frame],
     pub(crate) prior: Option<&'a Prior>,
     pub(crate) start: Option<&'a StartPrior>,
@@ -88,6 +91,8 @@ impl Problem<'_> {
             layout: self.layout,
             frames: self.frames,
             gravity_in_world: &self.gravity_in_world,
+            camera_from_gimbal_imu: self.camera_from_gimbal_imu.as_ref(),
+            calibration_first_estimates: self.calibration_first_estimates,
             at: estimate,
             linearized,
         }
@@ -99,6 +104,7 @@ impl Problem<'_> {
             sink.take(Some(MarginalPriorFactor::of(prior, point, &self.first_estimate_offset(point.at))));
         }
         sink.take(self.start.and_then(|start| StartPriorFactor::of(start, point)));
+        sink.take(self.start.and_then(|start| GimbalImuStartFactor::of(start, point)));
     }
 
     /// Costs by kind of factor.

@@ -98,6 +98,11 @@ pub enum JacobianFactor {
         from: FrameId,
         to: FrameId,
     },
+    /// Samples of the IMU on the gimbal between two frames.
+    GimbalImu {
+        from: FrameId,
+        to: FrameId,
+    },
     /// Encoder readings of a frame.
     Encoder(FrameId),
     ZeroVelocity,
@@ -113,6 +118,7 @@ impl JacobianFactor {
         let number = |slot: u16| numbers.get(usize::from(slot)).copied();
         Some(match label {
             FactorLabel::Imu(slot) => Self::Imu { from: number(slot.checked_sub(1)?)?, to: number(slot)? },
+            FactorLabel::GimbalImu(slot) => Self::GimbalImu { from: number(slot.checked_sub(1)?)?, to: number(slot)? },
             FactorLabel::Encoder(slot) => Self::Encoder(number(slot)?),
             FactorLabel::ZeroVelocity => Self::ZeroVelocity,
             FactorLabel::CalibrationPrior => Self::CalibrationPrior,
@@ -124,6 +130,7 @@ impl JacobianFactor {
         match self {
             Self::Feature(_) => FactorKind::Visual,
             Self::Imu { .. } => FactorKind::Imu,
+            Self::GimbalImu { .. } => FactorKind::GimbalImu,
             Self::Encoder(_) => FactorKind::Encoder,
             Self::ZeroVelocity => FactorKind::ZeroVelocity,
             Self::CalibrationPrior => FactorKind::CalibrationPrior,
@@ -179,6 +186,7 @@ impl JacobianSource {
                 navigation: NavigationState { world_from_imu, velocity_m_per_s: three(3), bias: ImuBias::default() },
                 joints_rad,
                 joint_motion: Vec::new(),
+                gimbal_imu: None,
                 rates: Arc::new(Rates {
                     gyroscope_rad_per_s: three(0),
                     joints_rad_per_s: rates.get(POSE..).unwrap_or_default().to_vec(),

@@ -8,6 +8,7 @@ use super::{Event, FactorRows, FeatureReport, JacobianSource, ResidualSummary, S
 use crate::estimator::problem::information_gain::InformationGain;
 use crate::estimator::problem::linearization::Linearization;
 use crate::estimator::problem::solver::IterationReport;
+use crate::estimator::state::gimbal_imu::GimbalImuState;
 use crate::frontend::FeatureId;
 use crate::geometry::RigidTransform;
 use crate::gimbal::{ClassicalChain, ParameterId, Parameterization, Singularity};
@@ -45,6 +46,8 @@ pub struct FrameStateReport {
     pub gyroscope_bias_rad_per_s: Vector3<f64>,
     /// Estimated joint angles (without the static offsets); empty for a rigid camera.
     pub joint_angles_rad: Vec<f64>,
+    /// Velocity and biases of the IMU on the gimbal, `None` without one.
+    pub gimbal_imu: Option<GimbalImuState>,
     /// Encoder angles at the stamp, `None` without encoders.
     pub encoder_angles_rad: Option<Vec<f64>>,
     /// Standard deviations of `encoder_angles_rad`, from the noise of a reading and the number of averaged readings.

@@ -25,6 +25,7 @@ use crate::estimator::window::sliding_window::SlidingWindow;
 use crate::estimator::window::window_state::WindowState;
 use crate::frontend::TrackedFeature;
 use crate::geometry::{RigidTransform, so3};
+use crate::sensors::ImuSample;
 
 /// Iteration limits of the solves of the first window: the first starts from inaccurate values, the others follow an
 /// outlier rejection.
@@ -57,14 +58,21 @@ impl<'a> FirstWindow<'a> {
         let errors = calibration.imu_errors().copied();
         let empty = || Preintegration::with_intrinsics(setup.imu_noise, solution.bias, errors);
         let mut imu = empty();
+        // Samples of the IMU on the gimbal since the last frame; none after an interval without them.
+        let mut gimbal_imu: Option<Vec<ImuSample>> = Some(Vec::new());
         let mut extrinsics = Vec::new();
         let mut observed = Vec::new();
         let mut features = vec![FeatureMap::new(); calibration.cameras()];
         let mut frames: Option<Frames> = None;
         for waiting in waiting {
             imu.extend(&waiting.imu);
+            gimbal_imu = gimbal_imu.filter(|_| !waiting.gimbal_imu.is_empty());
+            if let Some(samples) = &mut gimbal_imu {
+                samples.extend(&waiting.gimbal_imu);
+            }
             let Some(view) = views.iter().find(|view| view.frame_index == waiting.index) else { continue };
             let since_last = std::mem::replace(&mut imu, empty());
+            let gimbal_samples = gimbal_imu.replace(Vec::new()).unwrap_or_default();
             let motion = if frames.is_some() { since_last } else { empty() };
             let navigation = NavigationState {
                 world_from_imu: world * view.world_from_imu,
@@ -75,8 +83,14 @@ impl<'a> FirstWindow<'a> {
             let joint_motion = setup.initial_joint_motion(waiting.encoder.as_ref(), joints_rad.len());
             let profile = setup.motion_profile(&waiting.imu, &waiting.imu_after, solution.bias);
             let rates = Rates::at(&waiting.imu, waiting.encoder.as_ref(), profile);
-            let state = FrameState { navigation, joints_rad, joint_motion, rates };
-            let frame = Frame::new(waiting.index, waiting.stamp_ns, state, waiting.encoder, motion);
+            let own = setup.initial_gimbal_imu(navigation.velocity_m_per_s);
+            let gimbal_motion = frames.as_ref().and_then(|frames: &Frames| {
+                let interval_ns = waiting.stamp_ns - frames.newest().stamp_ns;
+                setup.gimbal_motion(&gimbal_samples, own?.bias, interval_ns)
+            });
+            let state = FrameState { navigation, joints_rad, joint_motion, gimbal_imu: own, rates };
+            let frame = Frame::new(waiting.index, waiting.stamp_ns, state, waiting.encoder, motion)
+                .with_gimbal_motion(gimbal_motion);
             match &mut frames {
                 None => frames = Some(Frames::new(frame)),
                 Some(frames) => frames.push(frame),
@@ -103,6 +117,11 @@ impl<'a> FirstWindow<'a> {
             bias: bias.mean,
             accelerometer_bias_sigma: bias.accelerometer_sigma_m_per_s2,
             gyroscope_bias_sigma: bias.gyroscope_sigma_rad_per_s,
+            gimbal_bias_sigmas: setup
+                .config
+                .gimbal_imu
+                .as_ref()
+                .map(|_| [options.gyroscope_bias_sigma, options.accelerometer_bias_sigma]),
         };
         let loss_scales = vec![LossScale::default(); calibration.cameras()];
         let state = WindowState { frames, features, calibration, prior: None, start: Some(start), loss_scales };

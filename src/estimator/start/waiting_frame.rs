@@ -15,6 +15,8 @@ pub(super) struct WaitingFrame {
     pub(super) imu: Vec<ImuSample>,
     /// IMU samples from the stamp on.
     pub(super) imu_after: Vec<ImuSample>,
+    /// Samples of the IMU on the gimbal over the interval of `imu`.
+    pub(super) gimbal_imu: Vec<ImuSample>,
 }
 
 impl WaitingFrame {
@@ -30,7 +32,7 @@ impl WaitingFrame {
         size_of::<Self>()
             + features
             + encoder
-            + (self.imu.capacity() + self.imu_after.capacity()) * size_of::<ImuSample>()
+            + (self.imu.capacity() + self.imu_after.capacity() + self.gimbal_imu.capacity()) * size_of::<ImuSample>()
     }
 }
 

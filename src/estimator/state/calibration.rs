@@ -220,6 +220,26 @@ impl Calibration {
         self.sensor_column(ParameterId::ENCODER_TIMESHIFT)
     }
 
+    /// Correction of the orientation of the IMU on the gimbal, as a rotation vector; zero without columns.
+    pub(crate) fn gimbal_imu_rotation(&self) -> Vector3<f64> {
+        let value = |quantity| self.sensor_value(ParameterId { part: ParameterPart::GimbalImu, quantity });
+        Vector3::new(value(Quantity::Rx), value(Quantity::Ry), value(Quantity::Rz))
+    }
+
+    /// First of the three columns of [`Self::gimbal_imu_rotation`], `None` if they are fixed.
+    pub(crate) fn gimbal_imu_rotation_column(&self) -> Option<usize> {
+        self.sensor_column(ParameterId { part: ParameterPart::GimbalImu, quantity: Quantity::Rx })
+    }
+
+    /// Time offset of the IMU on the gimbal relative to the rig, in seconds: measurement time minus stamp.
+    pub(crate) fn gimbal_imu_shift_s(&self) -> f64 {
+        self.sensor_value(ParameterId::GIMBAL_IMU_TIMESHIFT)
+    }
+
+    pub(crate) fn gimbal_imu_shift_column(&self) -> Option<usize> {
+        self.sensor_column(ParameterId::GIMBAL_IMU_TIMESHIFT)
+    }
+
     /// Readout time of the camera's shutter, in seconds.
     pub(crate) fn readout_s(&self) -> f64 {
         self.given_readout_s + self.sensor_value(ParameterId::readout(0))

@@ -24,6 +24,8 @@ pub enum ColumnId {
     Pose(FrameId),
     /// Velocity, gyroscope and accelerometer bias of a frame, nine columns.
     VelocityBias(FrameId),
+    /// Velocity, gyroscope and accelerometer bias of the IMU on the gimbal at a frame, nine columns.
+    GimbalImu(FrameId),
     /// Inverse depth of the row's feature, one column.
     InverseDepth,
 }
@@ -35,6 +37,7 @@ pub enum ColumnGroup {
     Joints,
     Pose,
     VelocityBias,
+    GimbalImu,
     InverseDepth,
 }
 
@@ -45,6 +48,7 @@ impl ColumnId {
             Self::Joints(_) => ColumnGroup::Joints,
             Self::Pose(_) => ColumnGroup::Pose,
             Self::VelocityBias(_) => ColumnGroup::VelocityBias,
+            Self::GimbalImu(_) => ColumnGroup::GimbalImu,
             Self::InverseDepth => ColumnGroup::InverseDepth,
         }
     }
@@ -60,7 +64,7 @@ impl ColumnId {
     /// Frame of the block, `None` for calibration and inverse depth.
     pub const fn frame(self) -> Option<FrameId> {
         match self {
-            Self::Joints(frame) | Self::Pose(frame) | Self::VelocityBias(frame) => Some(frame),
+            Self::Joints(frame) | Self::Pose(frame) | Self::VelocityBias(frame) | Self::GimbalImu(frame) => Some(frame),
             Self::Calibration(_) | Self::InverseDepth => None,
         }
     }
@@ -75,9 +79,9 @@ impl ColumnId {
             (Self::Calibration(parameter), _) => parameter.scale(),
             (Self::Joints(_), _) | (Self::Pose(_), 0..3) => Dimension::Angle.scale(),
             (Self::Pose(_), _) => Dimension::Length.scale(),
-            (Self::VelocityBias(_), 0..3) => VELOCITY_M_PER_S,
-            (Self::VelocityBias(_), 3..6) => GYROSCOPE_BIAS_RAD_PER_S,
-            (Self::VelocityBias(_), _) => ACCELEROMETER_BIAS_M_PER_S2,
+            (Self::VelocityBias(_) | Self::GimbalImu(_), 0..3) => VELOCITY_M_PER_S,
+            (Self::VelocityBias(_) | Self::GimbalImu(_), 3..6) => GYROSCOPE_BIAS_RAD_PER_S,
+            (Self::VelocityBias(_) | Self::GimbalImu(_), _) => ACCELEROMETER_BIAS_M_PER_S2,
             (Self::InverseDepth, _) => Dimension::Ratio.scale(),
         }
     }

@@ -1,7 +1,7 @@
 //! A frame of the window with its measurements.
 
 use super::frame_state::FrameState;
-use super::layout::Layout;
+use super::layout::{Layout, VELOCITY_BIAS};
 use super::navigation::Matrix15;
 use super::preintegration::Preintegration;
 use crate::sensors::JointAngles;
@@ -15,6 +15,20 @@ pub(crate) struct Stationary {
     pub(crate) position_sigma_m: f64,
     /// Standard deviation of the velocity, per axis.
     pub(crate) velocity_sigma_m_per_s: f64,
+}
+
+/// Preintegrated samples with their square-root information.
+#[derive(Clone, Debug)]
+pub(crate) struct InformedMotion {
+    pub(crate) motion: Preintegration,
+    /// Square-root information of `motion` (15 × 15), `None` if it is empty.
+    pub(crate) information: Option<Matrix15>,
+}
+
+impl InformedMotion {
+    pub(crate) fn new(motion: Preintegration) -> Self {
+        Self { information: motion.square_root_information(), motion }
+    }
 }
 
 #[derive(Clone, Debug)]
@@ -34,6 +48,9 @@ pub(crate) struct Frame {
     pub(crate) motion: Preintegration,
     /// Square-root information of `motion` (15 × 15), `None` when it is empty.
     pub(crate) motion_information: Option<Matrix15>,
+    /// Samples of the IMU on the gimbal since the previous frame of the window; `None` without one, or where some are
+    /// missing.
+    pub(crate) gimbal_motion: Option<InformedMotion>,
 }
 
 impl Frame {
@@ -55,7 +72,13 @@ impl Frame {
             keyframe: true,
             motion_information: motion.square_root_information(),
             motion,
+            gimbal_motion: None,
         }
+    }
+
+    /// This frame with samples of the IMU on the gimbal.
+    pub(crate) fn with_gimbal_motion(self, motion: Option<Preintegration>) -> Self {
+        Self { gimbal_motion: motion.map(InformedMotion::new), ..self }
     }
 
     /// State at which derivatives are evaluated: the first estimate while `current` is within `reach_rad` of it in
@@ -73,6 +96,7 @@ pub(crate) fn layout(frames: &[Frame], calibration: usize) -> Layout {
         joints: first.map_or(0, |state| state.joints_rad.len()),
         joint_motion: first.map_or(0, |state| state.joint_motion.len()),
         moving_rows: first.is_some_and(FrameState::has_moving_rows),
+        gimbal_imu: first.and_then(|state| state.gimbal_imu).map_or(0, |_| VELOCITY_BIAS),
         calibration,
     }
 }

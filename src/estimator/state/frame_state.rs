@@ -5,6 +5,7 @@ use std::sync::Arc;
 use nalgebra::{DVector, Vector3};
 
 use super::allocation::allocated_bytes;
+use super::gimbal_imu::GimbalImuState;
 use super::layout::{POSE, VELOCITY_BIAS};
 use super::motion_profile::{MotionProfile, RowMotion};
 use super::navigation::{NavigationState, Vector15};
@@ -19,6 +20,8 @@ pub(crate) struct FrameState {
     pub(crate) joints_rad: Vec<f64>,
     /// Joint rates in rad/s, then joint accelerations in rad/s²; empty unless rows of the image depend on them.
     pub(crate) joint_motion: Vec<f64>,
+    /// Velocity and biases of the IMU on the gimbal, `None` without one.
+    pub(crate) gimbal_imu: Option<GimbalImuState>,
     /// Measured rates of attitude and joints.
     pub(crate) rates: Arc<Rates>,
 }
@@ -142,7 +145,8 @@ impl FrameState {
         self.rates.gyroscope_rad_per_s - self.navigation.bias.gyroscope_rad_per_s
     }
 
-    /// `x ⊞ δ` with `δ` in the order of [`Layout`](super::layout::Layout): pose, joints, velocity and biases.
+    /// `x ⊞ δ` with `δ` in the order of [`Layout`](super::layout::Layout): pose, joints, velocity and biases, those of the
+    /// IMU on the gimbal.
     pub(crate) fn plus(&self, delta: &[f64]) -> Self {
         let block = self.joint_block();
         let mut navigation = Vector15::zeros();
@@ -154,6 +158,7 @@ impl FrameState {
             navigation: self.navigation.plus(&navigation),
             joints_rad: moved(&self.joints_rad, &delta[POSE..]),
             joint_motion: moved(&self.joint_motion, &delta[POSE + self.joints_rad.len()..]),
+            gimbal_imu: self.gimbal_imu.map(|own| own.plus(&delta[POSE + block + VELOCITY_BIAS..])),
             rates: Arc::clone(&self.rates),
         }
     }
@@ -162,7 +167,12 @@ impl FrameState {
     pub(crate) fn minus(&self, origin: &Self) -> DVector<f64> {
         let (joints, block) = (self.joints_rad.len(), self.joint_block());
         let navigation = self.navigation.minus(&origin.navigation);
-        let mut delta = DVector::zeros(POSE + block + VELOCITY_BIAS);
+        let own = self.gimbal_imu.zip(origin.gimbal_imu).map(|(own, origin)| own.minus(&origin));
+        let last = POSE + block + VELOCITY_BIAS;
+        let mut delta = DVector::zeros(last + own.map_or(0, |own| own.len()));
+        if let Some(own) = own {
+            delta.rows_mut(last, own.len()).copy_from_slice(&own);
+        }
         delta.rows_mut(0, POSE).copy_from(&navigation.fixed_rows::<POSE>(0));
         delta.rows_mut(POSE + block, VELOCITY_BIAS).copy_from(&navigation.fixed_rows::<VELOCITY_BIAS>(POSE));
         for (joint, (angle, start)) in self.joints_rad.iter().zip(&origin.joints_rad).enumerate() {

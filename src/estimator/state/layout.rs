@@ -9,8 +9,8 @@ pub(crate) const VELOCITY_BIAS: usize = 9;
 /// Length of `[v, b_g]`, the part of the velocity-bias block that affects the pose at times other than the stamp.
 pub(crate) const ROW_MOTION: usize = 6;
 
-/// Columns of the window: frame by frame `[pose 6 | joint angles N | joint motion | velocity and biases 9]`, then the static
-/// calibration.
+/// Columns of the window: frame by frame `[pose 6 | joint angles N | joint motion | velocity and biases 9 |
+/// IMU on the gimbal]`, then the static calibration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Layout {
     pub(crate) frames: usize,
@@ -20,13 +20,15 @@ pub(crate) struct Layout {
     /// True if camera poses are evaluated at other times than the stamp, so that they depend on velocity and gyroscope
     /// bias.
     pub(crate) moving_rows: bool,
+    /// Number of unknowns of an IMU on the gimbal, `[v, b_g, b_a]`: 9, or zero without one.
+    pub(crate) gimbal_imu: usize,
     /// Number of free calibration parameters.
     pub(crate) calibration: usize,
 }
 
 impl Layout {
     pub(crate) fn frame_len(&self) -> usize {
-        POSE + self.joint_block() + VELOCITY_BIAS
+        POSE + self.joint_block() + VELOCITY_BIAS + self.gimbal_imu
     }
 
     pub(crate) fn frame(&self, slot: usize) -> Range<usize> {
@@ -64,6 +66,12 @@ impl Layout {
         start..start + VELOCITY_BIAS
     }
 
+    /// Columns `[v, b_g, b_a]` of the IMU on the gimbal; empty without one.
+    pub(crate) fn gimbal_imu(&self, slot: usize) -> Range<usize> {
+        let end = (slot + 1) * self.frame_len();
+        end - self.gimbal_imu..end
+    }
+
     pub(crate) fn calibration(&self) -> Range<usize> {
         let start = self.frames * self.frame_len();
         start..start + self.calibration
@@ -72,7 +80,8 @@ impl Layout {
     /// Elimination order of the columns: velocities and biases from the newest frame back, which are
     /// coupled only with their neighbours, then poses and joints, then the calibration.
     pub(crate) fn elimination_order(&self) -> Vec<usize> {
-        let velocities = (0..self.frames).rev().flat_map(|slot| self.velocity_bias(slot));
+        let velocities =
+            (0..self.frames).rev().flat_map(|slot| self.velocity_bias(slot).start..self.gimbal_imu(slot).end);
         let poses = (0..self.frames).flat_map(|slot| self.pose(slot).start..self.joint_motion(slot).end);
         velocities.chain(poses).chain(self.calibration()).collect()
     }

@@ -12,6 +12,7 @@ pub(crate) mod earlier_pass;
 pub(crate) mod estimate;
 pub(crate) mod frame;
 pub(crate) mod frame_state;
+pub(crate) mod gimbal_imu;
 pub(crate) mod given_chain;
 pub(crate) mod imu_calibration;
 pub(crate) mod imu_errors;

@@ -20,6 +20,9 @@ const CLOCK_SIGMA_S: f64 = 0.02;
 /// Prior standard deviation of a readout time for which the rig has none, in seconds: shutters read an image in 5 to 35
 /// ms.
 const READOUT_SIGMA_S: f64 = 0.02;
+/// Prior standard deviation of each component of the rotation of an IMU on the gimbal relative to the rig, in radians:
+/// boards are soldered and screwed to within a degree.
+const GIMBAL_IMU_ROTATION_SIGMA_RAD: f64 = 0.02;
 /// Prior of intrinsics for which the rig has none: those of a target calibration, used at another focus.
 const INTRINSICS_SIGMA: IntrinsicsSigma = IntrinsicsSigma { focal_ratio: 0.02, centre_px: 10.0, distortion: 0.03 };
 
@@ -33,6 +36,18 @@ impl SensorColumn {
 
     pub(crate) fn readout(given_s: f64, sigma_s: Option<f64>) -> Self {
         Self { parameter: ParameterId::readout(0), given: given_s, sigma: sigma_s.unwrap_or(READOUT_SIGMA_S) }
+    }
+
+    /// Orientation of the IMU on the gimbal, as a rotation vector relative to the rig's, and its time offset.
+    pub(crate) fn gimbal_imu(given_timeshift_s: f64) -> Vec<Self> {
+        let rotation = [Quantity::Rx, Quantity::Ry, Quantity::Rz].map(|quantity| Self {
+            parameter: ParameterId { part: ParameterPart::GimbalImu, quantity },
+            given: 0.0,
+            sigma: GIMBAL_IMU_ROTATION_SIGMA_RAD,
+        });
+        let shift =
+            Self { parameter: ParameterId::GIMBAL_IMU_TIMESHIFT, given: given_timeshift_s, sigma: CLOCK_SIGMA_S };
+        rotation.into_iter().chain([shift]).collect()
     }
 
     /// Intrinsics of a camera: focal lengths, principal point, and the first distortion coefficients if the lens model

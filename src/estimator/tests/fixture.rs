@@ -27,7 +27,7 @@ use crate::estimator::{DEFAULT_CHAIN_PRIOR, Estimator, StepInput};
 use crate::frontend::TrackedFrame;
 use crate::geometry::Dimension;
 use crate::gimbal::{Chain, ParameterId, Parameterization};
-use crate::sensors::Rig;
+use crate::sensors::{ImuSample, Rig};
 use crate::simulation::{SyntheticFlight, SyntheticFrame, SyntheticMount, SyntheticOptions, synthetic_tracks};
 
 pub(super) struct TestWindow {
@@ -109,6 +109,7 @@ pub(super) fn step_before(
         stamp_ns: frame.stamp_ns,
         imu: &frame.imu,
         imu_after: next.map_or(&[], |next| &next.imu),
+        gimbal_imu: &frame.gimbal_imu,
         joint_angles: joint_angles.as_ref(),
         tracks,
         rigid_tracks,
@@ -116,12 +117,16 @@ pub(super) fn step_before(
 }
 
 fn flight(gimbal: bool) -> SyntheticFlight {
-    synthetic_tracks(&SyntheticOptions {
+    synthetic_tracks(&flight_options(gimbal))
+}
+
+fn flight_options(gimbal: bool) -> SyntheticOptions {
+    SyntheticOptions {
         mount: if gimbal { SyntheticMount::Gimbal } else { SyntheticMount::Static },
         duration_s: 8.0,
         features: 40,
         ..SyntheticOptions::default()
-    })
+    }
 }
 
 /// Window of six frames at the ground truth (landmarks from the noisy tracks), with the given chain.
@@ -149,6 +154,15 @@ pub(super) fn changed_window(
 ) -> TestWindow {
     let flight = flight(gimbal);
     let mut config = config(&flight.given_rig, Parameterization::Minimal, options);
+    change(&mut config);
+    window_of(&flight, None, config)
+}
+
+/// Window of a gimballed camera with an IMU on the gimbal, with a changed configuration.
+pub(super) fn gimbal_imu_window(options: EstimatorOptions, change: impl FnOnce(&mut EstimatorConfig)) -> TestWindow {
+    let flight = synthetic_tracks(&SyntheticOptions { gimbal_imu: true, ..flight_options(true) });
+    let mut config = config(&flight.given_rig, Parameterization::Minimal, options);
+    assert!(config.gimbal_imu.is_some());
     change(&mut config);
     window_of(&flight, None, config)
 }
@@ -191,9 +205,18 @@ fn window_of(flight: &SyntheticFlight, rigid: Option<&SyntheticFlight>, config: 
             },
             joints_rad: ground_truth.true_joint_angles_rad.clone(),
             joint_motion,
+            gimbal_imu: setup.initial_gimbal_imu(ground_truth.true_velocity_m_per_s),
             rates: Rates::at(&ground_truth.imu, encoder.as_ref(), profile),
         };
-        let frame = Frame::new(index, ground_truth.stamp_ns, state, encoder, motion);
+        let between = &flight.frames[index - spacing + 1..=index];
+        let samples: Vec<ImuSample> = between.iter().flat_map(|frame| &frame.gimbal_imu).copied().collect();
+        let gimbal_motion = (slot > 0)
+            .then(|| {
+                let interval_ns = ground_truth.stamp_ns - flight.frames[index - spacing].stamp_ns;
+                setup.gimbal_motion(&samples, ImuBias::default(), interval_ns)
+            })
+            .flatten();
+        let frame = Frame::new(index, ground_truth.stamp_ns, state, encoder, motion).with_gimbal_motion(gimbal_motion);
         match &mut frames {
             None => frames = Some(Frames::new(frame)),
             Some(frames) => frames.push(frame),
@@ -209,6 +232,7 @@ fn window_of(flight: &SyntheticFlight, rigid: Option<&SyntheticFlight>, config: 
         bias: ImuBias::default(),
         accelerometer_bias_sigma: Vector3::repeat(0.5),
         gyroscope_bias_sigma: Vector3::repeat(0.02),
+        gimbal_bias_sigmas: Some([0.02, 0.5]),
     };
     let loss_scales = vec![LossScale::default(); calibration.cameras()];
     let mut window = WindowState { frames, features, calibration, prior: None, start: Some(start), loss_scales };
@@ -239,6 +263,9 @@ pub(super) fn disturb(test: &mut TestWindow, scale: f64) {
             delta[column] = random.normal() * 0.01;
         }
         for (offset, column) in layout.velocity_bias(slot).enumerate() {
+            delta[column] = random.normal() * [0.1, 0.003, 0.05][offset / 3];
+        }
+        for (offset, column) in layout.gimbal_imu(slot).enumerate() {
             delta[column] = random.normal() * [0.1, 0.003, 0.05][offset / 3];
         }
     }

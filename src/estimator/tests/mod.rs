@@ -8,6 +8,7 @@ mod factors;
 mod fixture;
 mod flight;
 mod gain;
+mod gimbal_imu;
 mod jacobian;
 mod packed;
 mod preintegration;

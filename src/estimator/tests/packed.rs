@@ -18,6 +18,10 @@ impl StepMeasurements for SyntheticFrame {
         &self.imu
     }
 
+    fn gimbal_imu(&self) -> &[ImuSample] {
+        &self.gimbal_imu
+    }
+
     fn features(&self, _: usize) -> &[TrackedFeature] {
         &self.tracks.features
     }
@@ -60,6 +64,10 @@ fn an_unpacked_estimator_equals_the_packed_one() {
     assert!((40_000..200_000).contains(&bytes), "{bytes} bytes");
     let intrinsics = EstimatorConfig { estimate_imu_intrinsics: true, ..config };
     check(&flight, &intrinsics, 256, &|_| {});
+    let flight =
+        synthetic_tracks(&SyntheticOptions { duration_s: 6.0, gimbal_imu: true, ..SyntheticOptions::default() });
+    let config = fixture::config(&flight.given_rig, Parameterization::Minimal, EstimatorOptions::default());
+    check(&flight, &config, 256, &|_| {});
 }
 
 #[test]

@@ -22,7 +22,7 @@ fn quadratic() -> EstimatorOptions {
 }
 
 /// Windows of a gimbal in each parameterization, a rigid camera, both cameras with and without time offsets, a
-/// rolling shutter of 20 ms, and intrinsics.
+/// rolling shutter of 20 ms, intrinsics, and an IMU on the gimbal.
 pub(super) fn windows() -> Vec<(&'static str, TestWindow)> {
     let gimbal = |parameterization| fixture::window(parameterization, true, quadratic());
     vec![
@@ -49,6 +49,8 @@ pub(super) fn windows() -> Vec<(&'static str, TestWindow)> {
         ),
         ("IMU intrinsics", fixture::changed_window(false, quadratic(), |config| config.estimate_imu_intrinsics = true)),
         ("intrinsics", fixture::changed_window(true, quadratic(), |config| config.estimate_intrinsics = true)),
+        ("gimbal IMU", fixture::gimbal_imu_window(quadratic(), |_| {})),
+        ("gimbal IMU, axes", fixture::gimbal_imu_window(quadratic(), |config| config.estimate_gimbal_imu = true)),
     ]
 }
 
@@ -140,7 +142,7 @@ fn marginalizing_the_oldest_agrees_with_the_full_batch() {
         let mut prior = marginalization::oldest(&problem, &estimate).unwrap();
         let rest = fixture::rows(&problem, &estimate, |label| match label {
             FactorLabel::CalibrationPrior => true,
-            FactorLabel::Imu(slot) => slot >= 2,
+            FactorLabel::Imu(slot) | FactorLabel::GimbalImu(slot) => slot >= 2,
             FactorLabel::Encoder(slot) => slot >= 1,
             FactorLabel::ZeroVelocity | FactorLabel::MarginalizationPrior => false,
         });

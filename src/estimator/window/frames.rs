@@ -2,8 +2,10 @@
 
 use std::ops::{Deref, DerefMut};
 
+use nalgebra::SVector;
+
 use crate::estimator::config::EstimatorOptions;
-use crate::estimator::state::frame::Frame;
+use crate::estimator::state::frame::{Frame, InformedMotion};
 use crate::estimator::state::imu_errors::ImuErrors;
 
 /// Change of a scale error, a misalignment or the rotation in radians above which an interval is integrated again:
@@ -52,8 +54,13 @@ impl Frames {
         if slot >= self.newest_slot() {
             return;
         }
-        let mut motion = self.0.remove(slot).motion;
+        let Frame { mut motion, gimbal_motion, .. } = self.0.remove(slot);
         let next = &mut self.0[slot];
+        next.gimbal_motion = gimbal_motion.zip(next.gimbal_motion.take()).map(|(before, after)| {
+            let mut joined = before.motion;
+            joined.extend(after.motion.samples());
+            InformedMotion::new(joined)
+        });
         motion.extend(next.motion.samples());
         next.motion_information = motion.square_root_information();
         next.motion = motion;
@@ -64,14 +71,22 @@ impl Frames {
     pub(crate) fn reintegrate(&mut self, options: &EstimatorOptions, intrinsics: Option<&ImuErrors>) {
         let limit = options.reintegration_change;
         for slot in 1..self.0.len() {
-            let bias = self.0[slot - 1].state.navigation.bias;
+            let (bias, own) = (self.0[slot - 1].state.navigation.bias, self.0[slot - 1].state.gimbal_imu);
             let frame = &mut self.0[slot];
-            let change = frame.motion.bias_change(&bias);
-            let gyroscope = change.fixed_rows::<3>(0).abs() - limit.gyroscope_rad_per_s;
-            let accelerometer = change.fixed_rows::<3>(3).abs() - limit.accelerometer_m_per_s2;
+            let exceeds = |change: SVector<f64, 6>| {
+                let gyroscope = change.fixed_rows::<3>(0).abs() - limit.gyroscope_rad_per_s;
+                let accelerometer = change.fixed_rows::<3>(3).abs() - limit.accelerometer_m_per_s2;
+                gyroscope.max() > 0.0 || accelerometer.max() > 0.0
+            };
+            if let (Some(own), Some(gimbal)) = (own, &mut frame.gimbal_motion)
+                && exceeds(gimbal.motion.bias_change(&own.bias))
+            {
+                gimbal.motion.reintegrate(own.bias);
+                gimbal.information = gimbal.motion.square_root_information();
+            }
             let intrinsics_change = frame.motion.intrinsics_change(intrinsics).map_or(0.0, |change| change.amax());
             let reaches = intrinsics_change > REINTEGRATION_INTRINSICS_CHANGE;
-            if gyroscope.max() > 0.0 || accelerometer.max() > 0.0 || reaches {
+            if exceeds(frame.motion.bias_change(&bias)) || reaches {
                 frame.motion.reintegrate_with(bias, intrinsics.copied());
                 frame.motion_information = frame.motion.square_root_information();
             }

@@ -18,6 +18,10 @@ const MIN_LANDMARKS: usize = 15;
 /// readings are propagated with it: the visual rotation between the frames is then independent of the encoder.
 const SHARPER: f64 = 3.0;
 
+/// Standard deviation of joint angles that the difference of two gyroscopes predicts from those of the last frame, in
+/// radians: turn-on biases of 1°/s over two images.
+const GYROSCOPES_SIGMA_RAD: f64 = 0.002;
+
 impl WindowState {
     /// Fits the newest frame's joint angles to the observations of triangulated landmarks at a fixed pose: an
     /// encoder may have an error of many degrees, and without encoders there is no other initial value.
@@ -29,8 +33,11 @@ impl WindowState {
         let slot = self.frames.newest_slot();
         let view = self.view(setup, MAIN);
         let known = self.frames[slot].encoder.as_ref().map(|encoder| encoder.sigmas_rad.as_slice());
-        let prior =
-            DVector::from_fn(joints, |joint, _| known.map_or(UNKNOWN_JOINT_SIGMA_RAD, |sigmas| sigmas[joint]).powi(-2));
+        let sigma_rad = |joint: usize| match &self.frames[slot].gimbal_motion {
+            Some(_) => GYROSCOPES_SIGMA_RAD,
+            None => known.map_or(UNKNOWN_JOINT_SIGMA_RAD, |sigmas| sigmas[joint]),
+        };
+        let prior = DVector::from_fn(joints, |joint, _| sigma_rad(joint).powi(-2));
         let start = self.frames[slot].state.joints_rad.clone();
         let mut angles = start.clone();
         for _ in 0..5 {

@@ -12,6 +12,7 @@ pub(crate) mod drop_or_marginalize_frame;
 pub(crate) mod failure;
 pub(crate) mod features;
 pub(crate) mod frames;
+mod gimbal_imu;
 pub(crate) mod jacobian_source;
 pub(crate) mod joints;
 pub(crate) mod keyframes;

@@ -105,6 +105,7 @@ impl WindowState {
                     accelerometer_bias_m_per_s2: navigation.bias.accelerometer_m_per_s2,
                     gyroscope_bias_rad_per_s: navigation.bias.gyroscope_rad_per_s,
                     joint_angles_rad: frame.state.joints_rad.clone(),
+                    gimbal_imu: frame.state.gimbal_imu,
                     encoder_angles_rad: frame.encoder.as_ref().map(|encoder| encoder.angles_rad.clone()),
                     encoder_sigmas_rad: frame.encoder.as_ref().map(|encoder| encoder.sigmas_rad.clone()),
                     imu_from_camera: self.calibration.of(MAIN).imu_from_camera(&frame.state.joints_rad),
@@ -166,10 +167,11 @@ impl WindowState {
     }
 }
 
-/// Residuals by kind of factor, those of zero-velocity updates only where there are some.
+/// Residuals by kind of factor, those of zero-velocity updates and of the gimbal's IMU only where there are some.
 fn residual_summaries(solution: &Solution) -> Vec<ResidualSummary> {
     let (before, after) = (&solution.costs_before, &solution.costs_after);
-    let shown = |kind: &FactorKind| *kind != FactorKind::ZeroVelocity || after.count(*kind) > 0;
+    let shown =
+        |kind: &FactorKind| !matches!(kind, FactorKind::ZeroVelocity | FactorKind::GimbalImu) || after.count(*kind) > 0;
     let summary = |factor: FactorKind| ResidualSummary {
         factor,
         count: after.count(factor),

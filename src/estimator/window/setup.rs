@@ -7,10 +7,12 @@ use crate::estimator::factors::joint_motion::measured_joint_motion;
 use crate::estimator::state::calibration::Calibration;
 use crate::estimator::state::calibrations::{Calibrations, MAIN};
 use crate::estimator::state::earlier_pass::BiasPrior;
+use crate::estimator::state::gimbal_imu::GimbalImuState;
 use crate::estimator::state::given_chain::GivenSigmas;
 use crate::estimator::state::imu_calibration::ImuCalibration;
 use crate::estimator::state::motion_profile::MotionProfile;
 use crate::estimator::state::navigation::ImuBias;
+use crate::estimator::state::preintegration::Preintegration;
 use crate::estimator::state::sensor_columns::SensorColumn;
 use crate::estimator::step_input::StepInput;
 use crate::gimbal::Parameterization;
@@ -20,6 +22,9 @@ use crate::sensors::{ImuNoise, ImuSample, JointAngles};
 pub fn gravity_in_world(gravity_m_per_s2: f64) -> Vector3<f64> {
     Vector3::new(0.0, 0.0, -gravity_m_per_s2)
 }
+
+/// Largest part of an interval without samples of the IMU on the gimbal: rounding of stamps.
+const MAX_MISSING_NS: i64 = 1_000;
 
 #[derive(Clone, Debug)]
 pub(crate) struct Setup {
@@ -95,6 +100,9 @@ impl Setup {
         if config.estimate_intrinsics {
             columns.extend(SensorColumn::intrinsics(config.model(camera), sensor.intrinsics_sigma));
         }
+        if let Some(imu) = config.gimbal_imu.as_ref().filter(|_| config.estimate_gimbal_imu && camera == MAIN) {
+            columns.extend(SensorColumn::gimbal_imu(imu.timeshift_s));
+        }
         calibration.with_sensors(columns).with_given_readout(sensor.readout_s)
     }
 
@@ -123,6 +131,25 @@ impl Setup {
     pub(crate) fn initial_joint_motion(&self, encoder: Option<&JointAngles>, joints: usize) -> Vec<f64> {
         let count = if self.has_moving_rows() { 2 * joints } else { 0 };
         (0..count).map(|place| measured_joint_motion(encoder, place, joints).0).collect()
+    }
+
+    /// Unknowns of the IMU on the gimbal before any sample, at the velocity of the vehicle; `None` without one.
+    pub(crate) fn initial_gimbal_imu(&self, velocity_m_per_s: Vector3<f64>) -> Option<GimbalImuState> {
+        self.config.gimbal_imu.as_ref().map(|_| GimbalImuState { velocity_m_per_s, bias: ImuBias::default() })
+    }
+
+    /// Integrated samples of the IMU on the gimbal over an interval in nanoseconds; `None` without one, or if they do
+    /// not cover it.
+    pub(crate) fn gimbal_motion(
+        &self,
+        samples: &[ImuSample],
+        bias: ImuBias,
+        interval_ns: i64,
+    ) -> Option<Preintegration> {
+        let noise = self.config.gimbal_imu.as_ref()?.sensor.noise.scaled(self.config.options.imu_noise_factor);
+        let (first, last) = (samples.first()?, samples.last()?);
+        let missing_ns = interval_ns - (last.stamp_ns - first.stamp_ns);
+        (missing_ns <= MAX_MISSING_NS).then(|| Preintegration::from_samples(noise, bias, samples))
     }
 
     /// Encoder angles of the joints, `None` if they are unused or unusable.

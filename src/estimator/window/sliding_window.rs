@@ -134,14 +134,16 @@ impl SlidingWindow {
         }
         let navigation = motion.predict(&last.state.navigation, &setup.gravity_in_world);
         let encoder = setup.encoder_reading(input, window.calibration.of(MAIN).joint_count());
-        let joints_rad =
-            encoder.as_ref().map_or_else(|| last.state.joints_rad.clone(), |encoder| encoder.angles_rad.clone());
+        let mut predicted = window.predict_gimbal_imu(setup, input, &navigation);
+        let joints_rad = predicted.joints_rad.take().unwrap_or_else(|| {
+            encoder.as_ref().map_or_else(|| last.state.joints_rad.clone(), |encoder| encoder.angles_rad.clone())
+        });
         let joint_motion = setup.initial_joint_motion(encoder.as_ref(), joints_rad.len());
         let profile = setup.motion_profile(input.imu, input.imu_after, navigation.bias);
         let rates = Rates::at(input.imu, encoder.as_ref(), profile);
-        let state = FrameState { navigation, joints_rad, joint_motion, rates };
+        let state = FrameState { navigation, joints_rad, joint_motion, gimbal_imu: predicted.state, rates };
         let frame = Frame::new(input.frame_index, input.stamp_ns, state, encoder, motion);
-        window.frames.push(Frame { keyframe: false, ..frame });
+        window.frames.push(Frame { keyframe: false, ..frame.with_gimbal_motion(predicted.motion) });
         let slot = window.frames.newest_slot();
         for (camera, features) in window.features.iter_mut().enumerate() {
             features::observe(features, slot, input.features(camera));

@@ -20,6 +20,8 @@ pub(crate) enum CalibrationPart {
     Camera(u8),
     Gyroscope,
     Accelerometer,
+    /// The orientation of the IMU on the gimbal.
+    GimbalImu,
     /// Time offsets and readout times.
     Clocks,
 }
@@ -35,6 +37,7 @@ pub(crate) fn part_of(parameter: ParameterId) -> CalibrationPart {
         (_, ParameterPart::Camera(camera)) => CalibrationPart::Camera(camera),
         (_, ParameterPart::Gyroscope) => CalibrationPart::Gyroscope,
         (_, ParameterPart::Accelerometer) => CalibrationPart::Accelerometer,
+        (_, ParameterPart::GimbalImu) => CalibrationPart::GimbalImu,
         (_, ParameterPart::ImuFromBase | ParameterPart::Base) => CalibrationPart::Base,
         (_, ParameterPart::Link(link)) => CalibrationPart::Link(usize::from(link) + 1),
         (_, part) if part.camera() > 0 => CalibrationPart::Rigid,
@@ -51,6 +54,7 @@ pub(crate) fn heading_of(part: CalibrationPart, rig: &Rig) -> String {
         CalibrationPart::Camera(camera) => rig.parameter_names().part(ParameterPart::Camera(camera)),
         CalibrationPart::Gyroscope => "gyro".to_owned(),
         CalibrationPart::Accelerometer => "accel".to_owned(),
+        CalibrationPart::GimbalImu => "imu1".to_owned(),
         CalibrationPart::Clocks => "clocks".to_owned(),
     }
 }
@@ -97,6 +101,7 @@ pub(crate) fn meaning_of(parameter: ParameterId, rig: &Rig) -> String {
         (_, ParameterPart::Encoder) => "joint encoders".to_owned(),
         (_, ParameterPart::Gyroscope) => "gyroscope".to_owned(),
         (_, ParameterPart::Accelerometer) => "accelerometer".to_owned(),
+        (_, ParameterPart::GimbalImu) => "IMU on the gimbal".to_owned(),
         (_, part @ ParameterPart::Camera(_)) => names.part(part),
         (CalibrationPart::Base, _) => "IMU to gimbal base".to_owned(),
         (CalibrationPart::Link(number), _) => match joint_name(number, rig) {

@@ -196,6 +196,7 @@ pub(crate) mod factors {
         ENCODER: "encoder" => "Joint angles minus encoder readings over the encoder σ of the rig.";
         CALIBRATION_PRIOR: "calibration prior" => "Calibration minus the value of the rig over the prior σ of the rig.";
         MARGINALIZATION_PRIOR: "marginalization prior" => "Information of the frames that left the window about the frames in it.";
+        GIMBAL_IMU: "gimbal IMU" => "Preintegrated samples of the IMU on the gimbal between two frames; its biases are separate unknowns.";
         ZERO_VELOCITY: "zero velocity" => "Zero-velocity update (ZUPT) of a stationary vehicle.";
     }
 }

@@ -220,7 +220,7 @@ fn scalar_columns(block: &ColumnBlock, joint_count: usize) -> Vec<(String, f64)>
             let parts = [" rx", " ry", " rz"].map(|part| shown(part, Dimension::Angle)).into_iter();
             parts.chain([" tx", " ty", " tz"].map(|part| shown(part, Dimension::Length))).collect()
         }
-        ColumnId::VelocityBias(_) => Vec::new(),
+        ColumnId::VelocityBias(_) | ColumnId::GimbalImu(_) => Vec::new(),
         ColumnId::InverseDepth => vec![(", px·m".to_owned(), 1.0)],
     }
 }

@@ -101,7 +101,7 @@ fn scalar_columns(block: &ColumnBlock, joint_count: usize) -> Vec<(String, f64)>
             let rotations = ["rx", "ry", "rz"].map(|part| shown(part, Dimension::Angle)).into_iter();
             rotations.chain(["tx", "ty", "tz"].map(|part| shown(part, Dimension::Length))).collect()
         }
-        ColumnId::VelocityBias(_) => {
+        ColumnId::VelocityBias(_) | ColumnId::GimbalImu(_) => {
             let velocities = three(["vx", "vy", "vz"], "(m/s)", 1.0).into_iter();
             let angular_rates = three(["gx", "gy", "gz"], "(°/s)", degrees);
             velocities.chain(angular_rates).chain(three(["ax", "ay", "az"], "(m/s²)", 1.0)).collect()

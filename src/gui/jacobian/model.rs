@@ -129,6 +129,7 @@ pub(in crate::gui) fn name_of(factor: &JacobianFactor) -> String {
     match factor {
         JacobianFactor::Feature(id) => format!("feature {}", id.0),
         JacobianFactor::Imu { from, to } => format!("IMU {from} to {to}"),
+        JacobianFactor::GimbalImu { from, to } => format!("gimbal IMU {from} to {to}"),
         JacobianFactor::Encoder(frame) => format!("encoders {frame}"),
         JacobianFactor::ZeroVelocity => "zero velocity".to_owned(),
         JacobianFactor::CalibrationPrior => "rig prior".to_owned(),
@@ -142,7 +143,7 @@ fn rows_of(jacobian: &StepJacobian) -> MatrixAxis {
     const HEIGHT_RATIOS: [f32; 4] = [0.62, 0.15, 0.13, 0.1];
     let group_of = |factor: &JacobianFactor| match factor {
         JacobianFactor::Feature(_) => 0,
-        JacobianFactor::Imu { .. } => 1,
+        JacobianFactor::Imu { .. } | JacobianFactor::GimbalImu { .. } => 1,
         JacobianFactor::Encoder(_) => 2,
         JacobianFactor::ZeroVelocity | JacobianFactor::CalibrationPrior | JacobianFactor::MarginalizationPrior => 3,
     };
@@ -182,7 +183,7 @@ pub(super) fn columns_of(jacobian: &StepJacobian, names: &ParameterNames) -> Mat
             }
             ColumnId::Joints(_) => (states, 1.0),
             ColumnId::Pose(_) => (states + 1, 1.2),
-            ColumnId::VelocityBias(_) => (states + 2, 1.2),
+            ColumnId::VelocityBias(_) | ColumnId::GimbalImu(_) => (states + 2, 1.2),
             ColumnId::InverseDepth => (states + 3, 4.0),
         };
         (column_name(block.id, names), group, weight)
@@ -196,6 +197,7 @@ pub(in crate::gui) fn column_name(id: ColumnId, names: &ParameterNames) -> Strin
         ColumnId::Joints(frame) => format!("joints {frame}"),
         ColumnId::Pose(frame) => format!("pose {frame}"),
         ColumnId::VelocityBias(frame) => format!("velocity-bias {frame}"),
+        ColumnId::GimbalImu(frame) => format!("gimbal velocity-bias {frame}"),
         ColumnId::InverseDepth => "inverse depth".to_owned(),
     }
 }
@@ -232,7 +234,7 @@ pub(super) fn unit_text(block: &ColumnBlock, joint_count: usize) -> &'static str
         ColumnId::Joints(_) if block.len > joint_count => "σ per 10°, 10 °/s and 10 °/s²",
         ColumnId::Joints(_) => "σ per 10°",
         ColumnId::Pose(_) => "σ per 10° and 3 cm",
-        ColumnId::VelocityBias(_) => "σ per 0.1 m/s, 1 °/s and 0.1 m/s²",
+        ColumnId::VelocityBias(_) | ColumnId::GimbalImu(_) => "σ per 0.1 m/s, 1 °/s and 0.1 m/s²",
         ColumnId::InverseDepth => "σ per 10 % of the inverse depth",
     }
 }

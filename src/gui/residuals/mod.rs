@@ -359,6 +359,7 @@ const fn term_of(factor: FactorKind) -> Term {
         FactorKind::CalibrationPrior => factors::CALIBRATION_PRIOR,
         FactorKind::MarginalizationPrior => factors::MARGINALIZATION_PRIOR,
         FactorKind::ZeroVelocity => factors::ZERO_VELOCITY,
+        FactorKind::GimbalImu => factors::GIMBAL_IMU,
     }
 }
 

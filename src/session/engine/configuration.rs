@@ -34,6 +34,8 @@ pub(in crate::session) fn estimator_config(rig: &Rig, spec: &RunSpec) -> Result<
         estimate_readout: spec.readout,
         estimate_intrinsics: spec.intrinsics,
         estimate_imu_intrinsics: spec.imu_intrinsics,
+        gimbal_imu: configuration.gimbal_imu.clone().filter(|_| spec.gimbal_imu),
+        estimate_gimbal_imu: spec.gimbal_imu_axes,
         rigid_cameras: rigid.into_iter().filter_map(|camera| RigidCamera::of_rig(rig, camera)).collect(),
         options,
         clock_ms,

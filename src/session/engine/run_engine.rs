@@ -163,11 +163,14 @@ impl RunEngine {
         if let (Some(corrected), Some(corrected_after)) = (corrections.imu(&imu), corrections.imu(&imu_after)) {
             (imu, imu_after) = (Cow::Owned(corrected), Cow::Owned(corrected_after));
         }
+        // A shifted camera has other intervals than the samples of the IMU on the gimbal.
+        let gimbal_imu = if shift_ns == 0 { input.gimbal_imu.as_slice() } else { &[] };
         self.estimator.step(&StepInput {
             frame_index: input.frame_index,
             stamp_ns: input.stamp_ns,
             imu: &imu,
             imu_after: &imu_after,
+            gimbal_imu,
             joint_angles: noisy.as_ref().or(angles),
             tracks: &altered[0],
             rigid_tracks: &rigid,

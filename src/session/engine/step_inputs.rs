@@ -32,6 +32,8 @@ pub(in crate::session) struct OwnedStepInput {
     pub(in crate::session) imu: Vec<ImuSample>,
     /// IMU samples from the stamp on, for the rows of rolling shutters; empty where no run needs them.
     pub(in crate::session) imu_after: Vec<ImuSample>,
+    /// Samples of the IMU on the gimbal over the interval of `imu`; empty without one, or where they are missing.
+    pub(in crate::session) gimbal_imu: Vec<ImuSample>,
     /// Encoder readings at the stamp.
     pub(in crate::session) joint_angles: Option<JointAngles>,
     /// Tracks by camera, the main camera first; empty where an image is missing.
@@ -50,6 +52,7 @@ impl OwnedStepInput {
             log_time_ns: frame.log_time_ns,
             imu: frame.imu,
             imu_after: frame.imu_after,
+            gimbal_imu: frame.gimbal_imu,
             joint_angles: frame.joint_angles,
             tracks: vec![Arc::new(tracks)],
             ground_truth: frame.ground_truth,
@@ -73,6 +76,7 @@ impl OwnedStepInput {
         allocated_bytes(size_of::<Self>() + 2 * size_of::<usize>())
             + allocated_bytes(self.imu.capacity() * size_of::<ImuSample>())
             + allocated_bytes(self.imu_after.capacity() * size_of::<ImuSample>())
+            + allocated_bytes(self.gimbal_imu.capacity() * size_of::<ImuSample>())
             + self.joint_angles.as_ref().map_or(0, |angles| allocated_bytes(angles.heap_bytes()))
             + rigid
     }
@@ -85,6 +89,10 @@ impl StepMeasurements for OwnedStepInput {
 
     fn imu(&self) -> &[ImuSample] {
         &self.imu
+    }
+
+    fn gimbal_imu(&self) -> &[ImuSample] {
+        &self.gimbal_imu
     }
 
     fn features(&self, camera: usize) -> &[TrackedFeature] {
@@ -161,6 +169,7 @@ mod tests {
                 log_time_ns: 0,
                 imu: Vec::new(),
                 imu_after: Vec::new(),
+                gimbal_imu: Vec::new(),
                 joint_angles: None,
                 tracks: vec![Arc::default()],
                 ground_truth: None,

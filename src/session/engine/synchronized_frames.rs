@@ -61,6 +61,8 @@ pub(super) struct SynchronizedFrames {
     cameras: Vec<CameraInputs>,
     /// Last IMU sample of the previous set.
     end: Option<ImuSample>,
+    /// The same of the IMU on the gimbal; `None` where its samples are missing.
+    gimbal_end: Option<ImuSample>,
     /// Offset of the IMU's clock from the main camera's, from its last image.
     main_shift_ns: Option<i64>,
 }
@@ -72,7 +74,7 @@ impl SynchronizedFrames {
             .into_iter()
             .map(|(key, inputs)| CameraInputs { key, inputs, next: None, ended: false, unpaired_ns: Vec::new() })
             .collect();
-        Self { cameras, end: None, main_shift_ns: None }
+        Self { cameras, end: None, gimbal_end: None, main_shift_ns: None }
     }
 
     /// The next set; blocks until it is available. `None` at the end of all streams.
@@ -102,13 +104,11 @@ impl SynchronizedFrames {
         }
         // An input has the samples since the previous image of its own camera, but another camera may have had an image
         // since then.
-        let imu: Vec<ImuSample> = match self.end {
-            None => any.imu.clone(),
-            Some(end) => std::iter::once(end)
-                .chain(any.imu.iter().filter(|sample| sample.stamp_ns > end.stamp_ns).copied())
-                .collect(),
-        };
+        let imu = following(self.end, &any.imu);
         self.end = imu.last().copied().or(self.end);
+        let gimbal_imu =
+            if any.gimbal_imu.is_empty() { Vec::new() } else { following(self.gimbal_end, &any.gimbal_imu) };
+        self.gimbal_end = gimbal_imu.last().copied();
         let tracks = |frame: &Option<Arc<OwnedStepInput>>| {
             frame.as_ref().map_or_else(Arc::default, |frame| Arc::clone(frame.main_tracks()))
         };
@@ -118,6 +118,7 @@ impl SynchronizedFrames {
             log_time_ns: any.log_time_ns,
             imu,
             imu_after: any.imu_after.clone(),
+            gimbal_imu,
             joint_angles: any.joint_angles.clone(),
             tracks: frames.iter().map(tracks).collect(),
             ground_truth: any.ground_truth,
@@ -142,6 +143,16 @@ impl SynchronizedFrames {
             offset_ms: offsets_ns[offsets_ns.len() / 2] as f64 * 1e-6,
             count: offsets_ns.len(),
         })
+    }
+}
+
+/// Samples after the end of the previous set, which comes first; all samples without one.
+fn following(end: Option<ImuSample>, samples: &[ImuSample]) -> Vec<ImuSample> {
+    match end {
+        None => samples.to_vec(),
+        Some(end) => std::iter::once(end)
+            .chain(samples.iter().filter(|sample| sample.stamp_ns > end.stamp_ns).copied())
+            .collect(),
     }
 }
 
@@ -181,6 +192,7 @@ mod tests {
                     log_time_ns: *stamp_ns,
                     imu,
                     imu_after: Vec::new(),
+                    gimbal_imu: Vec::new(),
                     joint_angles: None,
                     tracks: vec![Arc::new(TrackedFrame { stamp_ns: *stamp_ns, ..TrackedFrame::default() })],
                     ground_truth: None,

@@ -11,7 +11,7 @@ use crate::frontend::{
     ChainOrientation, FrontEnd, FrontEndOptions, PredictionNoise, camera_rates, predict_camera_rotation,
 };
 use crate::gimbal::ClassicalChain;
-use crate::sensors::{CameraMount, PoseTrack, Rig};
+use crate::sensors::{CameraMount, ImuSample, PoseTrack, Rig};
 use crate::session::plan::SessionError;
 
 pub(super) struct CameraTracker {
@@ -21,8 +21,34 @@ pub(super) struct CameraTracker {
     noise: PredictionNoise,
     readout_s: f64,
     previous_orientation: Option<ChainOrientation>,
+    gimbal_imu: Option<GimbalGyroscope>,
+    /// True after the first image.
+    tracking: bool,
     /// Ground truth that replaces that of the log; `None` keeps the log's.
     ground_truth: Option<Arc<PoseTrack>>,
+}
+
+/// Gyroscope that moves with the camera.
+struct GimbalGyroscope {
+    /// Orientation of the camera relative to it, without joints.
+    orientation: ChainOrientation,
+    noise: PredictionNoise,
+}
+
+impl GimbalGyroscope {
+    /// Gyroscope of the rig for a camera with this mount; `None` without one, or for a rigid camera.
+    fn of_rig(rig: &Rig, mount: &CameraMount) -> Option<Self> {
+        let imu = rig.gimbal_imu.as_ref().filter(|_| *mount == CameraMount::Gimbal)?;
+        let camera = ClassicalChain { imu_from_base: imu.camera_from_imu.inverse(), ..ClassicalChain::default() };
+        Some(Self {
+            orientation: ChainOrientation::new(&camera, &[], &[]),
+            noise: PredictionNoise {
+                gyroscope_bias_rad_per_s: GYROSCOPE_BIAS_SIGMA_RAD_PER_S,
+                gyroscope_noise_density: imu.sensor.noise.gyroscope_noise_density,
+                chain_rotation_rad: RIGID_EXTRINSICS_SIGMA_RAD,
+            },
+        })
+    }
 }
 
 /// Standard deviation of a gyroscope's turn-on bias, in rad/s (1.1°/s, a small MEMS IMU).
@@ -59,6 +85,8 @@ impl CameraTracker {
             noise: prediction_noise(rig, &camera.mount),
             readout_s: camera.readout_s,
             previous_orientation: None,
+            gimbal_imu: GimbalGyroscope::of_rig(rig, &camera.mount),
+            tracking: false,
             ground_truth: None,
         })
     }
@@ -80,17 +108,23 @@ impl CameraTracker {
             }
             let watch = Stopwatch::start();
             let orientation = self.camera_orientation(&frame);
-            let predicted = match (&self.previous_orientation, &orientation) {
-                // The gyroscope bias is not removed here: over one frame it rotates the image by two pixels at most.
-                (Some(previous), Some(now)) => {
+            // The gyroscope bias is not removed here: over one frame it rotates the image by two pixels at most.
+            let predict =
+                |imu: &[ImuSample], previous: &ChainOrientation, now: &ChainOrientation, noise: &PredictionNoise| {
                     let bias = Vector3::zeros();
-                    predict_camera_rotation(&frame.imu, &bias, previous, now, &self.noise).map(|predicted| {
-                        let rates = camera_rates(&frame.imu, &bias, previous, now, self.readout_s);
-                        predicted.with_readout(self.readout_s, rates)
+                    predict_camera_rotation(imu, &bias, previous, now, noise).map(|predicted| {
+                        predicted.with_readout(self.readout_s, camera_rates(imu, &bias, previous, now, self.readout_s))
                     })
-                }
+                };
+            // The gyroscope on the gimbal measures the rotation of the camera without the joints in between.
+            let on_gimbal = self.gimbal_imu.as_ref().filter(|_| self.tracking).and_then(|gyroscope| {
+                predict(&frame.gimbal_imu, &gyroscope.orientation, &gyroscope.orientation, &gyroscope.noise)
+            });
+            let predicted = on_gimbal.or_else(|| match (&self.previous_orientation, &orientation) {
+                (Some(previous), Some(now)) => predict(&frame.imu, previous, now, &self.noise),
                 _ => None,
-            };
+            });
+            self.tracking = true;
             self.previous_orientation = orientation;
             match self.front_end.process(&frame.image, frame.stamp_ns, predicted.as_ref()) {
                 Ok(tracks) => {

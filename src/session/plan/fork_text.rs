@@ -20,7 +20,8 @@ impl ForkChanges {
         Key::<Self>::new(
             "estimate",
             "GROUP+…",
-            "sensor parameters estimated from here on: `timeshift`, `readout`, `intrinsics`, `imu-intrinsics`",
+            "sensor parameters estimated from here on: `timeshift`, `readout`, `intrinsics`, `imu-intrinsics`, \
+             `gimbal-imu-axes`",
             Field::Other(read_estimated, |changes| joined(changes.estimated.iter().map(|columns| columns.key()))),
         )
         .labelled("", "Estimate sensors", ""),

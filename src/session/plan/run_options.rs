@@ -47,6 +47,16 @@ impl RunSpec {
             |spec| &mut spec.imu_intrinsics,
         ),
         Key::<Self>::switch(
+            "gimbal-imu",
+            "use the IMU on the gimbal (`imu1` of the rig); `off` is for comparison",
+            |spec| &mut spec.gimbal_imu,
+        ),
+        Key::<Self>::switch(
+            SensorParameters::GimbalImu.key(),
+            "estimate orientation and time offset of the IMU on the gimbal",
+            |spec| &mut spec.gimbal_imu_axes,
+        ),
+        Key::<Self>::switch(
             "first-estimates",
             "evaluate Jacobians of the prior's states at first estimates (FEJ); `off` shows the spurious information",
             |spec| &mut spec.first_estimates,

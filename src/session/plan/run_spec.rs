@@ -106,6 +106,8 @@ pub struct RunSpec {
     pub readout: bool,
     pub intrinsics: bool,
     pub imu_intrinsics: bool,
+    pub gimbal_imu: bool,
+    pub gimbal_imu_axes: bool,
     pub first_estimates: bool,
     pub window: usize,
     pub passes: usize,
@@ -126,6 +128,8 @@ impl Default for RunSpec {
             readout: false,
             intrinsics: false,
             imu_intrinsics: false,
+            gimbal_imu: true,
+            gimbal_imu_axes: false,
             first_estimates: true,
             // As in the paper.
             window: 10,
@@ -154,6 +158,7 @@ impl RunSpec {
             SensorParameters::Readout => self.readout,
             SensorParameters::Intrinsics => self.intrinsics,
             SensorParameters::ImuIntrinsics => self.imu_intrinsics,
+            SensorParameters::GimbalImu => self.gimbal_imu_axes,
         }
     }
 
@@ -177,6 +182,7 @@ impl RunSpec {
             SensorParameters::Readout => &mut self.readout,
             SensorParameters::Intrinsics => &mut self.intrinsics,
             SensorParameters::ImuIntrinsics => &mut self.imu_intrinsics,
+            SensorParameters::GimbalImu => &mut self.gimbal_imu_axes,
         }
     }
 }

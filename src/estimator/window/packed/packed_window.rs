@@ -4,8 +4,8 @@ use super::packed_features::PackedFeatures;
 use crate::estimator::factors::packed_prior::PackedPrior;
 use crate::estimator::factors::start_prior::StartPrior;
 use crate::estimator::state::calibrations::Calibrations;
-use crate::estimator::state::frame::Frame;
 use crate::estimator::state::frame::Stationary;
+use crate::estimator::state::frame::{Frame, InformedMotion};
 use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::state::imu_errors::ImuErrors;
 use crate::estimator::state::navigation::ImuBias;
@@ -42,8 +42,25 @@ struct PackedFrame {
     stationary: Option<Stationary>,
     keyframe: bool,
     motion: PackedMotion,
+    gimbal_motion: Option<PackedMotion>,
     /// True if `motion_information` is present.
     informed: bool,
+}
+
+/// IMU whose samples are packed.
+#[derive(Clone, Copy, Debug)]
+enum PackedImu {
+    Vehicle,
+    Gimbal,
+}
+
+impl PackedImu {
+    fn samples(self, step: &dyn StepMeasurements) -> &[ImuSample] {
+        match self {
+            Self::Vehicle => step.imu(),
+            Self::Gimbal => step.gimbal_imu(),
+        }
+    }
 }
 
 /// Input of a [`Preintegration`].
@@ -125,13 +142,18 @@ impl PackedFrame {
             encoder: frame.encoder.clone(),
             stationary: frame.stationary,
             keyframe: frame.keyframe,
-            motion: PackedMotion::new(&frame.motion, past),
+            motion: PackedMotion::new(&frame.motion, past, PackedImu::Vehicle),
+            gimbal_motion: frame
+                .gimbal_motion
+                .as_ref()
+                .map(|gimbal| PackedMotion::new(&gimbal.motion, past, PackedImu::Gimbal)),
             informed: frame.motion_information.is_some(),
         }
     }
 
     fn unpacked(&self, past: &[&dyn StepMeasurements]) -> Frame {
-        let motion = self.motion.unpacked(past);
+        let motion = self.motion.unpacked(past, PackedImu::Vehicle);
+        let gimbal_motion = self.gimbal_motion.as_ref().map(|motion| motion.unpacked(past, PackedImu::Gimbal));
         Frame {
             index: self.index,
             stamp_ns: self.stamp_ns,
@@ -142,6 +164,7 @@ impl PackedFrame {
             keyframe: self.keyframe,
             motion_information: self.informed.then(|| motion.square_root_information()).flatten(),
             motion,
+            gimbal_motion: gimbal_motion.map(InformedMotion::new),
         }
     }
 
@@ -152,25 +175,28 @@ impl PackedFrame {
             + self.state.rates.bytes()
             + self.encoder.as_ref().map_or(0, JointAngles::heap_bytes)
             + self.motion.heap_bytes()
+            + self.gimbal_motion.as_ref().map_or(0, PackedMotion::heap_bytes)
     }
 }
 
 impl PackedMotion {
-    fn new(motion: &Preintegration, past: &[&dyn StepMeasurements]) -> Self {
+    fn new(motion: &Preintegration, past: &[&dyn StepMeasurements], imu: PackedImu) -> Self {
         let samples = motion.samples();
         let own = || PackedSamples::Own(samples.to_vec());
         Self {
             noise: *motion.noise(),
             bias: *motion.bias(),
             errors: motion.intrinsics().map(|errors| Box::new(*errors)),
-            samples: steps_with(samples, past).map_or_else(own, |(first, end)| PackedSamples::OfSteps(first, end)),
+            samples: steps_with(samples, past, imu).map_or_else(own, |(first, end)| PackedSamples::OfSteps(first, end)),
         }
     }
 
-    fn unpacked(&self, past: &[&dyn StepMeasurements]) -> Preintegration {
+    fn unpacked(&self, past: &[&dyn StepMeasurements], imu: PackedImu) -> Preintegration {
         let mut motion = Preintegration::with_intrinsics(self.noise, self.bias, self.errors.as_deref().copied());
         match &self.samples {
-            PackedSamples::OfSteps(first, end) => past[*first..*end].iter().for_each(|step| motion.extend(step.imu())),
+            PackedSamples::OfSteps(first, end) => {
+                past[*first..*end].iter().for_each(|step| motion.extend(imu.samples(*step)));
+            }
             PackedSamples::Own(samples) => motion.extend(samples),
         }
         motion
@@ -186,15 +212,16 @@ impl PackedMotion {
 }
 
 /// Range of consecutive steps whose samples, concatenated, integrate exactly as `samples`; `None` if there is none.
-fn steps_with(samples: &[ImuSample], past: &[&dyn StepMeasurements]) -> Option<(usize, usize)> {
+fn steps_with(samples: &[ImuSample], past: &[&dyn StepMeasurements], imu: PackedImu) -> Option<(usize, usize)> {
     let (first, last) = (samples.first()?, samples.last()?);
-    let begins = |step: &&dyn StepMeasurements| step.imu().first().is_some_and(|it| it.stamp_ns == first.stamp_ns);
-    let ends = |step: &&dyn StepMeasurements| step.imu().last().is_some_and(|it| it.stamp_ns == last.stamp_ns);
+    let begins =
+        |step: &&dyn StepMeasurements| imu.samples(*step).first().is_some_and(|it| it.stamp_ns == first.stamp_ns);
+    let ends = |step: &&dyn StepMeasurements| imu.samples(*step).last().is_some_and(|it| it.stamp_ns == last.stamp_ns);
     let end = past.iter().rposition(ends)? + 1;
     let begin = past[..end].iter().rposition(begins)?;
     let mut before: Option<&ImuSample> = None;
     let mut expected = samples.iter();
-    for sample in past[begin..end].iter().flat_map(|step| step.imu()) {
+    for sample in past[begin..end].iter().flat_map(|step| imu.samples(*step)) {
         if Preintegration::takes(before, sample) {
             if expected.next() != Some(sample) {
                 return None;

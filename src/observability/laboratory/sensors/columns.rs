@@ -45,6 +45,7 @@ impl SensorColumns {
     /// True if a sensor parameter belongs to one of the sets.
     pub fn has(self, parameter: ParameterId) -> bool {
         match (parameter.part, parameter.quantity) {
+            (ParameterPart::GimbalImu, _) => false,
             (_, Quantity::Readout) => self.readout,
             (_, Quantity::Timeshift) => self.timeshift,
             (ParameterPart::Camera(_), _) => self.intrinsics,

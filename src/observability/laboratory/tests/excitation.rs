@@ -46,6 +46,7 @@ fn step(estimator: &mut Estimator, frame: &SyntheticFrame) -> (StepReport, Optio
         stamp_ns: frame.stamp_ns,
         imu: &frame.imu,
         imu_after: &[],
+        gimbal_imu: &[],
         joint_angles: joints.as_ref(),
         tracks: &frame.tracks,
         rigid_tracks: &[],
