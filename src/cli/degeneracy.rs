@@ -47,6 +47,9 @@ pub(crate) struct DegeneracyArguments {
     /// Source of the vehicle's poses [default: known].
     #[arg(long, value_enum)]
     pub poses: Option<PosesArgument>,
+    /// Add an IMU that moves with the camera, its biases unknown.
+    #[arg(long, conflicts_with_all = ["table", "columns"])]
+    pub gimbal_imu: bool,
     /// Sensor columns in addition to those of the chain: readout, timeshift, intrinsics, imu-intrinsics, all;
     /// intrinsics of the IMU need `--poses imu` [default: chain].
     #[arg(long, value_name = "NAME,…")]
@@ -186,6 +189,7 @@ impl DegeneracyArguments {
                 && self.poses.is_none()
                 && self.columns.is_none()
                 && !self.advise
+                && !self.gimbal_imu
                 && self.frames.is_none()
                 && self.landmarks.is_none())
     }
@@ -218,6 +222,7 @@ impl DegeneracyArguments {
             PosesArgument::Imu => PoseKnowledge::Imu { noise: imu_noise, biases_known: false },
             PosesArgument::ImuBiasKnown => PoseKnowledge::Imu { noise: imu_noise, biases_known: true },
         };
+        setup.gimbal_imu = self.gimbal_imu;
         setup.frames = self.frames.map_or(setup.frames, usize::from);
         setup.landmarks = self.landmarks.map_or(setup.landmarks, usize::from);
         let columns = self.columns.unwrap_or_default();

@@ -7,7 +7,8 @@ use super::motion::{LaboratoryMotion, MechanismMotion};
 use super::sensors::SensorColumns;
 use crate::camera::{CameraModel, Distortion, Projection};
 use crate::estimator::{
-    HypotheticalFrame, HypotheticalLandmark, HypotheticalWindow, JointKnowledge, PoseKnowledge, gravity_in_world,
+    HypotheticalCameraImu, HypotheticalFrame, HypotheticalLandmark, HypotheticalWindow, JointKnowledge, PoseKnowledge,
+    gravity_in_world,
 };
 use crate::geometry::{Dimension, SplitMix64};
 use crate::gimbal::{Chain, ParameterId, Parameterization};
@@ -67,6 +68,8 @@ pub struct LaboratorySetup {
     pub frozen: Vec<usize>,
     pub joints: JointKnowledge,
     pub poses: PoseKnowledge,
+    /// True with an IMU that moves with the camera, of the noise of [`LABORATORY_IMU`].
+    pub gimbal_imu: bool,
     /// Number of frames, [`FRAME_PERIOD_S`] apart.
     pub frames: usize,
     pub landmarks: usize,
@@ -109,6 +112,7 @@ impl LaboratorySetup {
             frozen: Vec::new(),
             joints: JointKnowledge::Known,
             poses: PoseKnowledge::Known,
+            gimbal_imu: false,
             frames: 10,
             landmarks: 100,
             columns: SensorColumns::NONE,
@@ -164,6 +168,14 @@ impl LaboratorySetup {
                 } else {
                     Vec::new()
                 },
+                camera_imu: self.gimbal_imu.then(|| HypotheticalCameraImu {
+                    noise: LABORATORY_IMU,
+                    velocity_m_per_s: flight.camera_velocity_m_per_s(time_of(slot)),
+                    samples: match slot.checked_sub(1) {
+                        Some(before) => flight.camera_imu(time_of(before), time_of(slot), IMU_RATE_HZ),
+                        None => Vec::new(),
+                    },
+                }),
             })
             .collect();
         let landmarks = self.landmarks_of(&frames);

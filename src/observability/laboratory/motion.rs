@@ -380,4 +380,29 @@ impl MechanismMotion<'_> {
         let count = ((to_s - from_s) * rate_hz).round().max(1.0) as usize;
         (0..=count).map(|index| self.imu_sample(from_s + (to_s - from_s) * index as f64 / count as f64)).collect()
     }
+
+    fn world_from_camera(&self, time_s: f64) -> RigidTransform {
+        self.world_from_imu(time_s) * self.mechanism.chain.imu_from_camera(&self.joints_rad(time_s))
+    }
+
+    /// Velocity of the camera in the world, to about 1e-13.
+    pub(super) fn camera_velocity_m_per_s(&self, time_s: f64) -> Vector3<f64> {
+        derivative(|time_s| self.world_from_camera(time_s).translation_m, time_s)
+    }
+
+    /// Samples of an ideal IMU at the centre of the camera with its axes over an interval, both ends included.
+    pub(super) fn camera_imu(&self, from_s: f64, to_s: f64, rate_hz: f64) -> Vec<ImuSample> {
+        let sample = |time_s: f64| {
+            let rotation = self.world_from_camera(time_s).rotation;
+            let since = |time_s: f64| so3::log(&(rotation.inverse() * self.world_from_camera(time_s).rotation));
+            let acceleration = second_derivative(|time_s| self.world_from_camera(time_s).translation_m, time_s);
+            ImuSample {
+                stamp_ns: ns_from_seconds(time_s),
+                angular_velocity_rad_per_s: derivative(since, time_s),
+                specific_force_m_per_s2: rotation.inverse() * (acceleration - self.gravity_in_world),
+            }
+        };
+        let count = ((to_s - from_s) * rate_hz).round().max(1.0) as usize;
+        (0..=count).map(|index| sample(from_s + (to_s - from_s) * index as f64 / count as f64)).collect()
+    }
 }

@@ -23,6 +23,9 @@ pub struct LaboratoryReport {
     /// Source of the joint angles, with its σ.
     pub joint_angles: String,
     pub poses: String,
+    /// True with an IMU that moves with the camera.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub gimbal_imu: bool,
     pub frames: usize,
     /// Time between frames, in seconds.
     pub frame_period_s: f64,
@@ -123,6 +126,7 @@ impl LaboratoryReport {
                 PoseKnowledge::Imu { biases_known: false, .. } => "from the IMU, its biases unknown",
             }
             .to_owned(),
+            gimbal_imu: setup.gimbal_imu,
             frames: setup.frames,
             frame_period_s: FRAME_PERIOD_S,
             landmarks: setup.landmarks,
@@ -208,7 +212,8 @@ impl fmt::Display for LaboratoryReport {
         if !self.frozen_joints.is_empty() {
             writeln!(out, "           {} fixed", self.frozen_joints.join(", "))?;
         }
-        writeln!(out, "measured   joint angles {}, poses {}", self.joint_angles, self.poses)?;
+        let second = if self.gimbal_imu { ", an IMU that moves with the camera" } else { "" };
+        writeln!(out, "measured   joint angles {}, poses {}{second}", self.joint_angles, self.poses)?;
         if let Some(columns) = &self.columns {
             writeln!(out, "columns    {columns}, readout {:.0} ms", 1e3 * self.readout_s.unwrap_or_default())?;
         }

@@ -45,6 +45,7 @@ impl Window {
                     },
                     joints_rad: joints_rad.clone(),
                     imu: Vec::new(),
+                    camera_imu: None,
                 })
                 .collect(),
             landmarks: landmarks

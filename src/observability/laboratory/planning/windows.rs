@@ -95,6 +95,7 @@ pub(super) fn information_of_frames(
             navigation: NavigationState { world_from_imu, velocity_m_per_s: kinematics.velocity_m_per_s, bias },
             joints_rad: motion.joints_rad(*time_s),
             imu: slot.checked_sub(1).map_or_else(Vec::new, |before| samples(times_s[before], *time_s)),
+            camera_imu: None,
         }
     });
     predicted_information(situation, frames.collect(), landmarks)

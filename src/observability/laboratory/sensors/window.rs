@@ -125,6 +125,7 @@ impl<'a> SensorWindow<'a> {
             navigation: frame.navigation,
             joints_rad: frame.joints_rad.clone(),
             imu: Vec::new(),
+            camera_imu: None,
         };
         let frames: Vec<HypotheticalFrame> = self.truth.frames.iter().zip(&self.times_s).map(hypothetical).collect();
         for landmark in self.setup.landmarks_of(&frames) {
