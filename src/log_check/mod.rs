@@ -7,6 +7,7 @@ mod clocks;
 mod copies;
 mod correction;
 mod frozen_joints;
+mod gimbal_imu;
 mod gradient_sums;
 mod ground_truth;
 mod hand_eye;
@@ -116,6 +117,7 @@ pub fn check(log: &FlightLog, rig: Result<&Rig, &LogError>, image_rotations: &[I
         copies::check_image_copies(&survey, rig, &imu_facts, &mut findings);
         frozen_joints::check_frozen_joints(&survey, rig, &imu_facts, &mut findings);
         let turns = rotation::check_rotations(&survey, rig, &imu_facts, image_rotations, &mut findings);
+        gimbal_imu::check_gimbal_imu(&survey, rig, image_rotations, &mut findings);
         ground_truth::check_ground_truth(log, rig, &imu_facts, &turns, &mut findings);
         proposed_masks = still_pixels::check_still_pixels(&survey, rig, image_rotations, &mut findings);
     }
@@ -236,6 +238,9 @@ fn check_topics(log: &FlightLog, rig: &Rig, findings: &mut Findings) {
     if let Some(topic) = &rig.imu.accelerometer_topic {
         require("imu0.accelerometer_rostopic".into(), topic, &[MessageKind::Imu], Severity::Error);
     }
+    if let Some(imu) = &rig.gimbal_imu {
+        require("imu1.rostopic".into(), &imu.sensor.topic, &[MessageKind::Imu], Severity::Error);
+    }
     for camera in &rig.cameras {
         require(format!("{}.rostopic", camera.key), &camera.topic, &MessageKind::IMAGES, Severity::Error);
     }
@@ -267,6 +272,9 @@ fn role_of(topic: &str, kind: Option<MessageKind>, rig: Option<&Rig>) -> String 
         }
         if rig.imu.accelerometer_topic.as_deref() == Some(topic) {
             return "imu0 accelerometer".into();
+        }
+        if rig.gimbal_imu.as_ref().is_some_and(|imu| imu.sensor.topic == topic) {
+            return "imu1".into();
         }
         if let Some(camera) = rig.cameras.iter().find(|camera| camera.topic == topic) {
             return camera.key.clone();

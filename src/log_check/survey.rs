@@ -58,6 +58,9 @@ pub(super) struct Survey {
     pub(super) accelerometer_topic: Option<String>,
     /// Stamps and specific forces of that topic in the order of the stamps, without those that are no measurement.
     pub(super) accelerometer: Vec<(i64, Vector3<f64>)>,
+    /// Samples of the IMU on the gimbal in the order of their stamps, without those that are no measurement; empty
+    /// without one.
+    pub(super) gimbal_imu: Vec<ImuSample>,
     /// Messages of the IMU that are no measurement.
     pub(super) unmeasured: UnmeasuredStamps,
     /// Messages of the encoders in the order of log times.
@@ -142,6 +145,7 @@ impl Survey {
         if let Some(gimbal) = rig.and_then(|rig| rig.gimbal.as_ref()) {
             survey.set_joints(gimbal);
         }
+        survey.gimbal_imu = measured(std::mem::take(&mut survey.gimbal_imu), &mut UnmeasuredStamps::default());
         survey.imu = if survey.accelerometer.is_empty() {
             measured(std::mem::take(&mut survey.imu), &mut survey.unmeasured)
         } else {
@@ -257,6 +261,16 @@ impl Survey {
             }
         }
         let Some(rig) = rig else { return };
+        if let Some(imu) = rig.gimbal_imu.as_ref().filter(|imu| imu.sensor.topic == topic) {
+            match messages::read_imu(data) {
+                Ok(message) => self.gimbal_imu.push(imu.sensor.intrinsics.correct(&ImuSample {
+                    stamp_ns,
+                    angular_velocity_rad_per_s: message.angular_velocity_rad_per_s,
+                    specific_force_m_per_s2: message.specific_force_m_per_s2,
+                })),
+                Err(error) => entry.refuse(error.to_string()),
+            }
+        }
         if rig.imu.accelerometer_topic.as_deref() == Some(topic) {
             match messages::read_imu(data) {
                 Ok(imu) => {

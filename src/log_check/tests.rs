@@ -1,4 +1,5 @@
 mod clocks;
+mod gimbal_imu;
 mod unmeasured;
 
 use std::fmt::Write as _;

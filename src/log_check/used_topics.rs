@@ -53,6 +53,10 @@ pub(super) fn used_topics<'a>(survey: &'a Survey, rig: Option<&Rig>) -> Vec<Used
     };
     add("imu0", survey.imu_topic.as_deref(), rig.map(|rig| rig.imu.rate_hz), None);
     let Some(rig) = rig else { return used };
+    if let Some(imu) = &rig.gimbal_imu {
+        let shift = ("timeshift_imu1_imu", imu.timeshift_s);
+        add("imu1", Some(&imu.sensor.topic), Some(imu.sensor.rate_hz), Some(shift));
+    }
     for camera in &rig.cameras {
         let shift = ("timeshift_cam_imu", camera.timeshift_cam_imu_s);
         add(&camera.key, Some(&camera.topic), Some(camera.rate_hz), Some(shift));
