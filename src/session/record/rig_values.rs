@@ -1,8 +1,11 @@
 //! The rig's values of the calibration parameters that a run estimates, and a rig with the estimated values.
 
+use nalgebra::Vector3;
+
 use super::run::RunRecord;
 use crate::estimator::{CalibrationEstimate, imu_columns, imu_intrinsics, rigid_columns};
-use crate::gimbal::{Chain, NearestForm, ParameterGroup, ParameterId, ParameterPart, Parameterization};
+use crate::geometry::so3;
+use crate::gimbal::{Chain, NearestForm, ParameterId, ParameterPart, Parameterization, Quantity};
 use crate::sensors::{CameraMount, Rig};
 
 impl RunRecord {
@@ -28,6 +31,7 @@ impl RunRecord {
         if has_imu_columns(estimate) {
             values.extend(imu_columns(&rig.imu.intrinsics));
         }
+        values.extend(gimbal_imu_columns(rig, given, &estimate.parameters));
         for (parameter, value) in &mut values {
             *value = parameter.principal_value(*value);
         }
@@ -60,6 +64,7 @@ impl RunRecord {
             let intrinsics = imu_intrinsics(&columns);
             rig.imu.intrinsics = intrinsics.in_frame_of(&given.imu.intrinsics).unwrap_or(intrinsics);
         }
+        set_gimbal_imu(&mut rig, &columns);
         let chain = &calibration.classical;
         let Some(camera) = rig.cameras.iter_mut().find(|camera| camera.key == self.camera_key) else { return rig };
         match &mut camera.mount {
@@ -100,5 +105,35 @@ impl RunRecord {
 }
 
 fn has_imu_columns(estimate: &CalibrationEstimate) -> bool {
-    estimate.parameters.iter().any(|parameter| parameter.group() == ParameterGroup::Imu)
+    let is_intrinsic = |part| matches!(part, ParameterPart::Gyroscope | ParameterPart::Accelerometer);
+    estimate.parameters.iter().any(|parameter| is_intrinsic(parameter.part))
+}
+
+/// Columns of the rotation vector of the gimbal's IMU.
+const GIMBAL_IMU_ROTATION: [Quantity; 3] = [Quantity::Rx, Quantity::Ry, Quantity::Rz];
+
+/// A rig's values of those of `parameters` that belong to the IMU on the gimbal: its orientation relative to `given`, and
+/// its time offset.
+fn gimbal_imu_columns(rig: &Rig, given: &Rig, parameters: &[ParameterId]) -> Vec<(ParameterId, f64)> {
+    let (Some(imu), Some(given)) = (&rig.gimbal_imu, &given.gimbal_imu) else { return Vec::new() };
+    let rotation = so3::log(&(given.camera_from_imu.rotation.inverse() * imu.camera_from_imu.rotation));
+    let value = |quantity: Quantity| match quantity {
+        Quantity::Timeshift => Some(imu.timeshift_s),
+        _ => GIMBAL_IMU_ROTATION.iter().position(|known| *known == quantity).map(|axis| rotation[axis]),
+    };
+    let own = parameters.iter().filter(|parameter| parameter.part == ParameterPart::GimbalImu);
+    own.filter_map(|parameter| Some((*parameter, value(parameter.quantity)?))).collect()
+}
+
+/// Sets orientation and time offset of the IMU on the gimbal to estimated values.
+fn set_gimbal_imu(rig: &mut Rig, columns: &[(ParameterId, f64)]) {
+    let value = |quantity: Quantity| {
+        let wanted = ParameterId { part: ParameterPart::GimbalImu, quantity };
+        columns.iter().find(|(parameter, _)| *parameter == wanted).map(|(_, value)| *value)
+    };
+    let Some(imu) = &mut rig.gimbal_imu else { return };
+    if let [Some(x), Some(y), Some(z)] = GIMBAL_IMU_ROTATION.map(value) {
+        imu.camera_from_imu.rotation *= so3::exp(&Vector3::new(x, y, z));
+    }
+    imu.timeshift_s = value(Quantity::Timeshift).unwrap_or(imu.timeshift_s);
 }
