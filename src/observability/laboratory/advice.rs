@@ -204,6 +204,7 @@ pub(super) fn information_of_exercise(
                 let motion = |time_s: f64| navigation_at(situation, exercise, time_s);
                 samples(&motion, states[before].0, *time_s, &gravity)
             }),
+            camera_imu: None,
         })
         .collect();
     predicted_information(situation, frames, LANDMARKS_PER_FRAME)

@@ -1,4 +1,5 @@
-use super::super::{LaboratoryForm, LaboratoryMotion, LaboratorySetup, Mechanism};
+use super::super::{LABORATORY_IMU, LaboratoryForm, LaboratoryMotion, LaboratorySetup, Mechanism};
+use crate::estimator::{JointKnowledge, PoseKnowledge};
 use crate::gimbal::Parameterization;
 
 #[test]
@@ -28,4 +29,21 @@ fn experiments_are_repeatable() {
     setup.motion = LaboratoryMotion::YawTilted;
     let form = LaboratoryForm::whole(Parameterization::Classical);
     assert_eq!(setup.run(form).unwrap(), setup.run(form).unwrap());
+}
+
+/// Without encoders a second IMU determines the camera's path within one window; the joint offsets stay absorbed by the
+/// free joint angles, whatever measures the camera's pose.
+#[test]
+fn an_imu_on_the_camera_leaves_only_the_joint_offsets_without_encoders() {
+    let mut setup = LaboratorySetup::new(Mechanism::named("yaw-roll-pitch-offset").unwrap());
+    setup.joints = JointKnowledge::Unknown;
+    setup.poses = PoseKnowledge::Imu { noise: LABORATORY_IMU, biases_known: false };
+    let form = LaboratoryForm::whole(Parameterization::Minimal);
+    let without = setup.run(form).unwrap();
+    setup.gimbal_imu = true;
+    let with = setup.run(form).unwrap();
+    assert_eq!(without.rank.rank_structural, 12);
+    assert_eq!(with.rank.rank_structural, 15);
+    let null = with.null_parameters();
+    assert!(null.len() == 3 && null.iter().all(|parameter| parameter.is_joint_offset()), "{null:?}");
 }
