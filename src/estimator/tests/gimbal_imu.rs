@@ -1,7 +1,9 @@
 //! IMU on the gimbal: its samples against the true motion, accuracy without encoders, directions that it leaves
 //! unobservable.
 
-use nalgebra::DVector;
+use std::collections::BTreeSet;
+
+use nalgebra::{DVector, Vector3};
 
 use super::fixture;
 use super::flight::{chain_error, run_flight, trajectory_error_m};
@@ -11,7 +13,7 @@ use crate::estimator::report::StepReport;
 use crate::estimator::state::calibrations::MAIN;
 use crate::estimator::state::navigation::{ImuBias, NavigationState};
 use crate::estimator::state::preintegration::Preintegration;
-use crate::geometry::{RigidTransform, wrap_angle};
+use crate::geometry::{RigidTransform, so3, wrap_angle};
 use crate::gimbal::{ParameterNames, Parameterization};
 use crate::sensors::ImuNoise;
 use crate::simulation::{SyntheticFlight, SyntheticOptions, synthetic_tracks};
@@ -110,7 +112,7 @@ fn without_encoders_the_second_imu_improves_trajectory_and_joint_angles() {
 #[test]
 fn orientation_and_time_offset_of_the_second_imu_are_estimated() {
     let flight = synthetic_tracks(&options(7));
-    let turned = crate::geometry::so3::exp(&nalgebra::Vector3::new(0.02, -0.015, 0.01));
+    let turned = so3::exp(&Vector3::new(0.02, -0.015, 0.01));
     let mut given = config(&flight);
     let imu = given.gimbal_imu.as_mut().unwrap();
     imu.camera_from_imu.rotation *= turned;
@@ -130,6 +132,25 @@ fn orientation_and_time_offset_of_the_second_imu_are_estimated() {
         assert!(sigma < 0.3 * calibration.prior_sigmas[column], "{name}: σ {sigma}");
     }
     assert!(error_m < wrong_m, "{error_m} m, {wrong_m} m with the wrong axes");
+}
+
+#[test]
+fn wrong_axes_of_the_second_imu_are_named_in_the_warning() {
+    let flight = synthetic_tracks(&options(7));
+    let warnings = |config: EstimatorConfig| {
+        let (_, reports) = run_flight(&flight.frames, config);
+        let all: BTreeSet<String> =
+            reports.iter().flat_map(|report| &report.warnings).map(ToString::to_string).collect();
+        all
+    };
+    let mut wrong = config(&flight);
+    wrong.gimbal_imu.as_mut().unwrap().camera_from_imu.rotation *= so3::exp(&Vector3::new(0.05, -0.04, 0.03));
+    let found = warnings(wrong.clone());
+    assert!(found.iter().any(|warning| warning.contains("try gimbal-imu-axes=on")), "{found:?}");
+    for right in [config(&flight), EstimatorConfig { estimate_gimbal_imu: true, ..wrong }] {
+        let found = warnings(right);
+        assert!(!found.iter().any(|warning| warning.contains("gimbal")), "{found:?}");
+    }
 }
 
 /// Missing samples leave intervals without a factor, and the window goes on.

@@ -89,7 +89,7 @@ impl WindowState {
         }
         let mut wider = setup.clone();
         (wider.config.estimate_timeshift, wider.config.estimate_readout) = (true, true);
-        wider.config.estimate_intrinsics = true;
+        (wider.config.estimate_intrinsics, wider.config.estimate_gimbal_imu) = (true, true);
         let mut window = self.clone();
         window.add_columns(&wider);
         let active = window.active_tracks();

@@ -9,7 +9,7 @@ use crate::estimator::config::EstimatorConfig;
 use crate::estimator::factors::FactorKind;
 use crate::estimator::report::{ResidualSummary, StepWarning};
 use crate::geometry::seconds_from_ns;
-use crate::gimbal::Quantity;
+use crate::gimbal::{ParameterPart, Quantity};
 
 /// Averaging time of the squared residuals, in nanoseconds. No warning is given earlier: single images, stops and
 /// shocks are no inconsistency, and the values of the first window are always inaccurate.
@@ -32,8 +32,9 @@ struct MonitoredFactor {
 
 /// Consistent encoder readings have χ²/dof 1. Most rows of the prior are fitted, so its χ²/dof is 0.1 to 0.45
 /// (simulated and real logs) with a correct model; a camera time offset of 10 ms raises it to 2, an encoder time offset
-/// of 20 ms to 1.2.
-const MONITORED: [MonitoredFactor; 2] = [
+/// of 20 ms to 1.2. Most rows of the gimbal's IMU are fitted, too: their χ²/dof stays below 0.5 with a correct model; axes
+/// that are off by 1.4° and a time offset of 10 ms raise it to 0.9.
+const MONITORED: [MonitoredFactor; 3] = [
     MonitoredFactor {
         factor: FactorKind::Encoder,
         limit: 1.6,
@@ -43,6 +44,11 @@ const MONITORED: [MonitoredFactor; 2] = [
         factor: FactorKind::MarginalizationPrior,
         limit: 0.7,
         inconsistency: "Marginalization prior inconsistent with the window",
+    },
+    MonitoredFactor {
+        factor: FactorKind::GimbalImu,
+        limit: 0.6,
+        inconsistency: "IMU on the gimbal inconsistent with images, IMU and joint angles",
     },
 ];
 
@@ -130,11 +136,16 @@ impl ConsistencyMonitor {
     }
 }
 
-/// Cause of an inconsistency: a rolling shutter or wrong intrinsics if they explain the windows better than any time
-/// offset, else unknown.
+/// Cause of an inconsistency: the axes or the clock of the gimbal's IMU, a rolling shutter or wrong intrinsics if they
+/// explain the windows better than any time offset of cameras and encoders, else unknown.
 fn cause(suspected: &[SuspectedParameter], config: &EstimatorConfig) -> String {
     let strongest = suspected.iter().max_by(|one, other| one.chi2().total_cmp(&other.chi2()));
     let Some(found) = strongest.filter(|it| it.chi2() > SIGNIFICANT_CHI2) else { return UNKNOWN_CAUSE.to_owned() };
+    if found.parameter.part == ParameterPart::GimbalImu {
+        return "orientation or time offset of the IMU on the gimbal not as in the rig: try gimbal-imu-axes=on (dcvins check \
+                measures both)"
+            .to_owned();
+    }
     let rigid = found.parameter.part.camera().checked_sub(1).and_then(|rigid| config.rigid_cameras.get(rigid));
     let camera = rigid.map_or("the camera", |rigid| &rigid.key);
     let intrinsics = match found.parameter.quantity {
