@@ -18,7 +18,7 @@ macro_rules! document {
 }
 
 /// The manual is first.
-const DOCUMENTS: [Document; 28] = [
+const DOCUMENTS: [Document; 29] = [
     document!("docs/manual.md"),
     document!("docs/tutorial.md"),
     document!("docs/recordings.md"),
@@ -35,6 +35,7 @@ const DOCUMENTS: [Document; 28] = [
     document!("docs/experiments/README.md"),
     document!("docs/experiments/images_and_front_end.md"),
     document!("docs/experiments/encoders_and_joint_angles.md"),
+    document!("docs/experiments/gimbal_imu.md"),
     document!("docs/experiments/robustness.md"),
     document!("docs/experiments/second_pass_and_first_seconds.md"),
     document!("docs/experiments/solver_and_first_window.md"),
