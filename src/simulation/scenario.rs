@@ -2,11 +2,10 @@
 
 use super::equipment::{Equipment, GRAVITY_M_PER_S2, IMU_RATE_HZ, IntrinsicsError, given_rig, random_imu_intrinsics};
 use super::gimbal::{JointMotion, LookAround, Stabilizer};
-use super::gimbal_imu::{FIRST_SAMPLE_S, motion_of_gimbal_imu};
 use super::imu::{FIREFLY_IMU, ImuRecord};
 use super::random::RandomStream;
 use super::trajectory::Trajectory;
-use crate::geometry::{RigidTransform, ns_from_seconds, seconds_from_ns, so3};
+use crate::geometry::{RigidTransform, ns_from_seconds, seconds_from_ns};
 use crate::sensors::{CameraMount, CameraRig, ChainPrior, JointSample, Rig};
 
 /// Streams of random numbers, one per purpose, so that they are independent.
@@ -42,7 +41,7 @@ pub(crate) struct Scenario {
     pub(crate) gimbal_imu_record: Option<ImuRecord>,
     pub(crate) true_rig: Rig,
     pub(crate) given_rig: Rig,
-    seed: u64,
+    pub(super) seed: u64,
 }
 
 /// Options of a scenario in addition to its trajectory.
@@ -73,38 +72,6 @@ impl Scenario {
         );
         let gimbal_imu_record = None;
         Self { trajectory, joints, imu_record, gimbal_imu_record, true_rig, given_rig, seed: options.seed }
-    }
-
-    /// Simulates the samples of the IMU on the gimbal, if the rig has one; the joints must have their final motion.
-    pub(crate) fn measure_gimbal_imu(&mut self, noise_scale: f64) {
-        let Some(imu) = &self.true_rig.gimbal_imu else { return };
-        let rate_hz = imu.sensor.rate_hz;
-        let duration_s = self.trajectory.duration_s();
-        let count = ((duration_s - FIRST_SAMPLE_S) * rate_hz).floor().max(0.0) as usize + 1;
-        let times_s = (0..count).map(|index| FIRST_SAMPLE_S + index as f64 / rate_hz);
-        // The rig has joints, as it has an IMU on them.
-        let motion = |time_s: f64| motion_of_gimbal_imu(self, imu, time_s, 1.0 / rate_hz).unwrap_or_default();
-        let mut random = RandomStream::new(self.seed, stream::GIMBAL_IMU);
-        let record = ImuRecord::of_motion(times_s, motion, &imu.sensor.noise, rate_hz, noise_scale, &mut random);
-        self.gimbal_imu_record = Some(record);
-    }
-
-    /// Applies errors of the IMU on the gimbal that the given rig does not have: the stamps are `shift_s` before the
-    /// measurements, and the axes differ by random rotations of this standard deviation.
-    pub(crate) fn spoil_gimbal_imu(&mut self, [shift_s, axes_rad]: [f64; 2]) {
-        let mut random = RandomStream::new(self.seed, stream::GIMBAL_IMU_AXES);
-        if let Some(imu) = &mut self.given_rig.gimbal_imu {
-            imu.camera_from_imu.rotation *= so3::exp(&random.normal_vector(axes_rad));
-        }
-        if let (Some(imu), Some(record)) = (&mut self.true_rig.gimbal_imu, &mut self.gimbal_imu_record) {
-            imu.timeshift_s = shift_s;
-            for sample in &mut record.samples {
-                sample.stamp_ns -= ns_from_seconds(shift_s);
-            }
-            let before_start = record.samples.partition_point(|sample| sample.stamp_ns < 0);
-            record.samples.drain(..before_start);
-            record.biases.drain(..before_start);
-        }
     }
 
     /// Applies random scales and axes to the IMU samples, which are absent from the given rig.

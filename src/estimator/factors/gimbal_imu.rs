@@ -14,7 +14,7 @@ use super::imu::{jacobians, residual};
 use super::kind::FactorLabel;
 use crate::estimator::state::calibrations::MAIN;
 use crate::estimator::state::frame::InformedMotion;
-use crate::estimator::state::gimbal_imu::GimbalImuMount;
+use crate::estimator::state::gimbal_imu_mount::GimbalImuMount;
 use crate::estimator::state::layout::{POSE, VELOCITY_BIAS};
 use crate::estimator::state::navigation::{Matrix15, NavigationState, Vector15};
 

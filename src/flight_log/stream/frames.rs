@@ -11,7 +11,7 @@ use super::gaps::GapWatch;
 use super::gimbal_imu::GimbalImuStream;
 use super::ground_truth::GroundTruth;
 use super::imu::ImuStream;
-use super::imu_buffer::{FIRST_FRAME_IMU_NS, ImuBuffer};
+use super::imu_buffer::{FIRST_FRAME_IMU_NS, FrameImuBuffer};
 use super::joint_angles::JointAngleStream;
 use super::joint_topic::JointSamples;
 use super::read_context::ReadContext;
@@ -34,7 +34,7 @@ pub(super) struct FrameSource {
     imu_ended: bool,
     /// Stamp of the last sample of a rotation.
     rotating_ns: Option<i64>,
-    buffer: ImuBuffer,
+    buffer: FrameImuBuffer,
     gimbal_imu: Option<GimbalImuStream>,
     joints: Option<JointAngleStream>,
     /// Topic of the joint angles of a camera on a gimbal.
@@ -85,7 +85,7 @@ impl FrameSource {
             imu_gaps: GapWatch::new(WarningKind::ImuGap, &rig.imu.topic, rig.imu.rate_hz),
             imu_ended: false,
             rotating_ns: None,
-            buffer: ImuBuffer::default(),
+            buffer: FrameImuBuffer::default(),
             gimbal_imu,
             without_joints_ns: None,
             joint_topic: joints.is_some().then(|| joint_topic(rig, camera)).flatten(),

@@ -3,7 +3,7 @@
 use super::super::{FlightLog, LogError, WarningKind};
 use super::gaps::GapWatch;
 use super::imu::ImuStream;
-use super::imu_buffer::ImuBuffer;
+use super::imu_buffer::FrameImuBuffer;
 use super::read_context::ReadContext;
 use crate::geometry::ns_from_seconds;
 use crate::sensors::{GimbalImuRig, ImuSample};
@@ -15,7 +15,7 @@ const LONGEST_INTERVAL_NS: i64 = 100_000_000;
 /// Reads the IMU on the gimbal, with its stamps on the clock of the vehicle's IMU.
 pub(super) struct GimbalImuStream {
     stream: ImuStream,
-    buffer: ImuBuffer,
+    buffer: FrameImuBuffer,
     gaps: GapWatch,
     shift_ns: i64,
     ended: bool,
@@ -26,7 +26,7 @@ impl GimbalImuStream {
         let shift_ns = ns_from_seconds(rig.timeshift_s);
         Ok(Self {
             stream: ImuStream::of_key(log, "imu1", &rig.sensor, from_ns.saturating_sub(shift_ns.abs()))?,
-            buffer: ImuBuffer::default(),
+            buffer: FrameImuBuffer::default(),
             gaps: GapWatch::new(WarningKind::ImuGap, &rig.sensor.topic, rig.sensor.rate_hz),
             shift_ns,
             ended: false,

@@ -9,13 +9,13 @@ pub(super) const FIRST_FRAME_IMU_NS: i64 = 2_000_000_000;
 
 /// Samples not before the previous frame, and the first one after the frame.
 #[derive(Debug, Default)]
-pub(super) struct ImuBuffer {
+pub(super) struct FrameImuBuffer {
     pub(super) samples: VecDeque<ImuSample>,
     /// Sample interpolated at the previous frame's end.
     pub(super) previous_end: Option<ImuSample>,
 }
 
-impl ImuBuffer {
+impl FrameImuBuffer {
     /// True if the samples reach a stamp.
     pub(super) fn reaches(&self, stamp_ns: i64) -> bool {
         self.samples.back().is_some_and(|last| last.stamp_ns >= stamp_ns)
