@@ -117,7 +117,7 @@ impl ForkDialog {
             ui.end_row();
             let parameter = selected.0.map_or_else(|| "yaw.alpha".to_owned(), |parameter| ctx.names().name(parameter));
             let feature = selected.1.map_or_else(|| "12 15".to_owned(), |id| id.0.to_string());
-            let sensors = SensorParameters::ALL.map(SensorParameters::key).join(" ");
+            let sensors = sensors_of(ctx).join(" ");
             let camera = second_camera(ctx).unwrap_or_else(|| "cluster runs only: one of the two cameras".to_owned());
             let text_ui = |ui: &mut Ui, label: &str, text: &mut String, hint: &str| {
                 let name = ui.label(label);
@@ -184,6 +184,15 @@ fn unknown_name(changes: &ForkChanges, ctx: &PanelContext<'_>) -> Option<String>
 /// The keys that have a label.
 fn labelled() -> impl Iterator<Item = (&'static Key<ForkChanges>, &'static Label)> {
     ForkChanges::KEYS.iter().filter_map(|key| Some((key, key.label.as_ref()?)))
+}
+
+/// Keys of the sensor parameters that the run at the cursor can estimate: those of the IMU on the gimbal only if it has one.
+fn sensors_of(ctx: &PanelContext<'_>) -> Vec<&'static str> {
+    let run = ctx.recording.runs.get(ctx.selection.run);
+    let newest = run.and_then(|run| run.step_at(ctx.cursor_ns)).and_then(|step| step.report.newest());
+    let has_gimbal_imu = newest.is_some_and(|newest| newest.gimbal_imu.is_some());
+    let known = SensorParameters::ALL.into_iter();
+    known.filter(|it| *it != SensorParameters::GimbalImu || has_gimbal_imu).map(SensorParameters::key).collect()
 }
 
 /// The second camera of the shown run.
