@@ -4,6 +4,7 @@ pub(crate) mod calibration_files;
 pub(crate) mod calibration_report;
 mod covariance;
 mod error;
+mod euroc;
 mod evaluation;
 pub(crate) mod existing;
 #[cfg(feature = "gui")]
@@ -34,6 +35,7 @@ mod video_alignment;
 pub use calibration_files::write_calibration;
 pub use calibration_report::{CalibrationReport, report_calibration};
 pub use error::ExportError;
+pub use euroc::{EurocCamera, EurocReport, check_euroc_folder, write_euroc};
 pub use evaluation::{EvaluationOptions, EvaluationReport, evaluate};
 pub use existing::{
     check_calibration_folder, check_converted_log, check_report_folder, check_run_folders, check_screenshot,

@@ -12,6 +12,27 @@ use crate::geometry::{RigidTransform, seconds_from_ns};
 use crate::session::accuracy::StampedPose;
 use crate::session::{CalibrationRun, RunRecord};
 
+/// Columns of EuRoC's `state_groundtruth_estimate0`: stamp, position, orientation, velocity and biases.
+pub(super) const EUROC_COLUMNS: [&str; 17] = [
+    "#timestamp [ns]",
+    "p_RS_R_x [m]",
+    "p_RS_R_y [m]",
+    "p_RS_R_z [m]",
+    "q_RS_w []",
+    "q_RS_x []",
+    "q_RS_y []",
+    "q_RS_z []",
+    "v_RS_R_x [m s^-1]",
+    "v_RS_R_y [m s^-1]",
+    "v_RS_R_z [m s^-1]",
+    "b_w_RS_S_x [rad s^-1]",
+    "b_w_RS_S_y [rad s^-1]",
+    "b_w_RS_S_z [rad s^-1]",
+    "b_a_RS_S_x [m s^-2]",
+    "b_a_RS_S_y [m s^-2]",
+    "b_a_RS_S_z [m s^-2]",
+];
+
 /// Absolute header stamp in seconds with nanosecond resolution.
 fn absolute_seconds(epoch_ns: i64, stamp_ns: i64) -> String {
     let absolute_ns = i128::from(epoch_ns) + i128::from(stamp_ns);
@@ -52,25 +73,7 @@ fn tum(poses: impl Iterator<Item = (i64, RigidTransform)>, epoch_ns: i64) -> Str
 /// Trajectory of a run as a table like EuRoC's `state_groundtruth_estimate0`: stamp in nanoseconds, position,
 /// orientation (w first) and velocity of the IMU in the estimator's world, gyroscope and accelerometer bias.
 pub fn euroc_of_run(run: &RunRecord, epoch_ns: i64) -> String {
-    let mut table = CsvWriter::new([
-        "#timestamp [ns]",
-        "p_RS_R_x [m]",
-        "p_RS_R_y [m]",
-        "p_RS_R_z [m]",
-        "q_RS_w []",
-        "q_RS_x []",
-        "q_RS_y []",
-        "q_RS_z []",
-        "v_RS_R_x [m s^-1]",
-        "v_RS_R_y [m s^-1]",
-        "v_RS_R_z [m s^-1]",
-        "b_w_RS_S_x [rad s^-1]",
-        "b_w_RS_S_y [rad s^-1]",
-        "b_w_RS_S_z [rad s^-1]",
-        "b_a_RS_S_x [m s^-2]",
-        "b_a_RS_S_y [m s^-2]",
-        "b_a_RS_S_z [m s^-2]",
-    ]);
+    let mut table = CsvWriter::new(EUROC_COLUMNS);
     for newest in run.steps.iter().filter_map(|step| step.report.newest()) {
         let rotation = newest.world_from_imu.rotation.quaternion();
         let orientation = Vector4::new(rotation.w, rotation.i, rotation.j, rotation.k);

@@ -55,7 +55,9 @@ pub use rig::template as rig_template;
 pub use rig::{MissingSensors, RigCandidate, is_imu_file_of, is_rig_name, missing_sensors, rig_candidates};
 pub use sensor_frame::SensorFrame;
 pub use stills::{read_stills, read_stills_chain};
-pub use stream::FrameStream;
+pub use stream::{
+    FrameStream, RecordedImage, SensorSamples, ground_truth_poses, imu_samples, joint_samples, recorded_images,
+};
 pub use text::{edit_distance, log_name, nearest_name, printable, printable_lines, shortened, without_signed_zeros};
 pub use topic_info::TopicInfo;
 pub use trajectory::{BATCH_REFERENCE, RecordedPose, is_batch_reference, read_trajectory_file};

@@ -36,6 +36,9 @@ fn wrong_use_is_exit_code_2() {
         }
         check(&["simulate", "t1", name, "x", "--no-such"], 2, &["unexpected argument '--no-such'"]);
     }
+    check(&["convert", &path("text.mcap"), "--to", "euroc", "-o", &out], 1, &["text.mcap"]);
+    check(&["convert", &path("text.mcap"), "--camera", "cam0", "-o", &path("x.mcap")], 1, &["--to euroc"]);
+    check(&["simulate", "T1", "--world", "facades", "-o", &path("x.mcap")], 1, &["T1", "'facades'", "plain"]);
     check(&["evaluate", "a.tum", "b.tum", "--delta", "3x"], 2, &["--delta", "10m"]);
     check(&["simulate", "T9", "-o", "x.mcap"], 2, &["T9", "t1"]);
 }

@@ -1,29 +1,30 @@
 //! EuRoC/ASL folders: `mav0` with a folder per sensor, each with `data.csv` and `sensor.yaml`.
 
 use std::fs::{self, File};
-use std::io::{self, BufRead as _, BufReader, Read as _};
+use std::io::{self, Read as _};
 use std::path::{Component, Path, PathBuf};
-
-use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use super::super::MessageTimes;
 use super::super::file::kind_of;
 use super::super::image_decoding::compressed_format;
-use super::super::limits::{LINE_BYTES, LogLimits};
-use super::super::stamp_text::{StampUnit, WrittenStamp, is_heading, read_stamp};
-use super::super::text::without_bom;
+use super::super::limits::LogLimits;
 use super::ConvertError;
+use super::euroc_rig::{EUROC_GIMBAL, EUROC_GROUND_TRUTH, JOINT_TOPIC, pose_topic, rig_in};
 use super::euroc_sensor::{CameraSensor, IMU_TOPIC, image_topic, rig_of, sensor_pose};
+use super::euroc_tables::{
+    SHORTEST_IMU_STEP_NS, SHORTEST_STEP_NS, Sample, for_each_row, in_nanoseconds, read_images, read_imu, read_joints,
+    read_poses,
+};
 use super::sink::LogSink;
-use crate::geometry::RigidTransform;
 use crate::sensors::Rig;
 
 /// Sensors with poses, the best ground truth first.
-const POSE_FOLDERS: [&str; 3] = ["state_groundtruth_estimate0", "mocap0", "vicon0"];
+const POSE_FOLDERS: [&str; 3] = [EUROC_GROUND_TRUTH, "mocap0", "vicon0"];
 /// Topic type in the report for image files.
 const IMAGE_TYPE: &str = "sensor_msgs/msg/CompressedImage";
 const IMU_TYPE: &str = "sensor_msgs/msg/Imu";
 const POSE_TYPE: &str = "geometry_msgs/msg/PoseStamped";
+const JOINT_TYPE: &str = "sensor_msgs/msg/JointState";
 
 /// Folder of the sensors: `mav0` in the source, or the source itself.
 pub(super) fn root(source: &Path) -> Option<PathBuf> {
@@ -31,49 +32,11 @@ pub(super) fn root(source: &Path) -> Option<PathBuf> {
     [source.join("mav0"), source.to_owned()].into_iter().find(|folder| has_sensors(folder))
 }
 
-/// Shortest step between two images or two poses.
-const SHORTEST_STEP_NS: i64 = 500_000;
-/// Shortest step between two samples of an IMU.
-const SHORTEST_IMU_STEP_NS: i64 = 50_000;
-
-/// Row of a table with its line and its stamp as written.
-struct Row {
-    line: usize,
-    stamp: WrittenStamp,
-    sample: Sample,
-}
-
-/// Samples of a table with stamps in nanoseconds; a note if the table has another unit.
-fn in_nanoseconds(
-    rows: Vec<Row>,
-    shortest_step_ns: i64,
-    table: &Path,
-    name: &str,
-    sink: &mut LogSink<'_>,
-) -> Result<Vec<(i64, Sample)>, ConvertError> {
-    let stamps: Vec<WrittenStamp> = rows.iter().map(|row| row.stamp).collect();
-    let unit = StampUnit::of(&stamps, StampUnit::Nanoseconds, shortest_step_ns);
-    if unit != StampUnit::Nanoseconds {
-        sink.note(format!("the stamps of {name}/data.csv are in {}, which are converted to nanoseconds", unit.name()));
-    }
-    let sample = |row: Row| {
-        let stamp_ns = unit.nanoseconds(row.stamp).filter(|stamp_ns| *stamp_ns >= 0);
-        let problem = || format!("a stamp of {} {}, which no clock has", row.stamp / 1_000_000_000, unit.name());
-        Ok((stamp_ns.ok_or_else(|| bad_line(row.line, problem(), table))?, row.sample))
-    };
-    rows.into_iter().map(sample).collect()
-}
-
-/// Row of any sensor.
-enum Sample {
-    Imu { angular_velocity_rad_per_s: Vector3<f64>, specific_force_m_per_s2: Vector3<f64> },
-    Image { camera: usize, name: String },
-    Pose { source: usize, world_from_imu: RigidTransform },
-}
-
 /// Converts a folder into a log and returns its rig if the sensors are described.
 pub(super) fn convert(source: &Path, sink: &mut LogSink<'_>) -> Result<Option<Rig>, ConvertError> {
     let Some(root) = root(source) else { return Ok(None) };
+    let rig = rig_in(&root, sink);
+    let joint_names = rig.as_ref().map(Rig::joint_names).unwrap_or_default();
     let mut folders = sensor_folders(&root)?;
     let mut samples: Vec<(i64, Sample)> = Vec::new();
     let mut cameras: Vec<CameraSensor> = Vec::new();
@@ -100,6 +63,9 @@ pub(super) fn convert(source: &Path, sink: &mut LogSink<'_>) -> Result<Option<Ri
             let rows = read_poses(&table, poses.len(), &imu_from_sensor.inverse())?;
             samples.extend(in_nanoseconds(rows, SHORTEST_STEP_NS, &table, name, sink)?);
             poses.push(name.clone());
+        } else if name == EUROC_GIMBAL && !joint_names.is_empty() {
+            let rows = read_joints(&table, joint_names.len())?;
+            samples.extend(in_nanoseconds(rows, SHORTEST_IMU_STEP_NS, &table, name, sink)?);
         } else {
             let mut rows = 0;
             for_each_row(&table, |_, _| {
@@ -109,20 +75,17 @@ pub(super) fn convert(source: &Path, sink: &mut LogSink<'_>) -> Result<Option<Ri
             sink.leave(&format!("/{name}"), "data.csv", rows, "no sensor that the program reads");
         }
     }
+    let sensors = FolderSensors { cameras, poses, joint_names };
     // Stable sort: sensors with equal stamps stay in the order of their names.
     samples.sort_by_key(|(stamp_ns, _)| *stamp_ns);
     let count = samples.len();
     for (index, (stamp_ns, sample)) in samples.into_iter().enumerate() {
-        write(stamp_ns, &sample, &cameras, &poses, sink)?;
+        write(stamp_ns, &sample, &sensors, sink)?;
         sink.progress((index + 1) as f64 / count as f64);
         sink.ensure_running()?;
     }
-    let ground_truth = POSE_FOLDERS.into_iter().find(|name| poses.iter().any(|present| present == name));
-    Ok(rig_of(source, &root, &cameras, ground_truth.map(pose_topic), sink))
-}
-
-fn pose_topic(folder: &str) -> String {
-    format!("/{folder}/pose")
+    let ground_truth = POSE_FOLDERS.into_iter().find(|name| sensors.poses.iter().any(|present| present == name));
+    Ok(rig.or_else(|| rig_of(source, &root, &sensors.cameras, ground_truth.map(pose_topic), sink)))
 }
 
 fn sensor_folders(root: &Path) -> Result<Vec<String>, ConvertError> {
@@ -137,13 +100,16 @@ fn sensor_folders(root: &Path) -> Result<Vec<String>, ConvertError> {
     Ok(names)
 }
 
-fn write(
-    stamp_ns: i64,
-    sample: &Sample,
-    cameras: &[CameraSensor],
-    poses: &[String],
-    sink: &mut LogSink<'_>,
-) -> Result<(), ConvertError> {
+/// Sensors to which samples refer by number.
+struct FolderSensors {
+    cameras: Vec<CameraSensor>,
+    /// Folders of poses.
+    poses: Vec<String>,
+    joint_names: Vec<String>,
+}
+
+fn write(stamp_ns: i64, sample: &Sample, sensors: &FolderSensors, sink: &mut LogSink<'_>) -> Result<(), ConvertError> {
+    let FolderSensors { cameras, poses, joint_names } = sensors;
     let times = MessageTimes { stamp_ns, log_time_ns: stamp_ns };
     match sample {
         Sample::Imu { angular_velocity_rad_per_s, specific_force_m_per_s2 } => {
@@ -165,6 +131,10 @@ fn write(
             let topic = pose_topic(&poses[*source]);
             sink.writer.write_pose(&topic, "world", times, world_from_imu)?;
             sink.taken(&topic, POSE_TYPE);
+        }
+        Sample::Joints { angles_rad } => {
+            sink.writer.write_joints(JOINT_TOPIC, times, joint_names, angles_rad)?;
+            sink.taken(JOINT_TOPIC, JOINT_TYPE);
         }
     }
     Ok(())
@@ -194,111 +164,4 @@ fn read_image_file(folder: &Path, name: &str, limits: &LogLimits) -> Result<(&'s
     let most = limits.record_bytes(metadata.len());
     File::open(&path).and_then(|file| file.take(most).read_to_end(&mut bytes)).map_err(cannot)?;
     compressed_format(&bytes).map(|format| (format, bytes)).ok_or_else(|| "is neither PNG nor JPEG".to_owned())
-}
-
-/// Calls `visit` with the line number and the cells of each row of a table, without comments and empty lines.
-fn for_each_row(
-    table: &Path,
-    mut visit: impl FnMut(usize, &[&str]) -> Result<(), ConvertError>,
-) -> Result<(), ConvertError> {
-    let mut reader = BufReader::new(File::open(table).map_err(ConvertError::io("read", table))?);
-    let mut line = 0;
-    let mut is_first = true;
-    let mut bytes = Vec::new();
-    loop {
-        bytes.clear();
-        let read = reader.by_ref().take(LINE_BYTES).read_until(b'\n', &mut bytes);
-        if read.map_err(ConvertError::io("read", table))? == 0 {
-            return Ok(());
-        }
-        line += 1;
-        if bytes.len() as u64 == LINE_BYTES {
-            return Err(bad_line(
-                line,
-                format!("longer than {LINE_BYTES} bytes, expected numbers between commas"),
-                table,
-            ));
-        }
-        let text =
-            std::str::from_utf8(&bytes).map_err(|error| bad_line(line, format!("not UTF-8 text ({error})"), table))?;
-        let text = if line == 1 { without_bom(text) } else { text }.trim();
-        if !text.is_empty() && !text.starts_with('#') {
-            let cells: Vec<&str> = if text.contains(',') {
-                text.split(',').map(str::trim).collect()
-            } else {
-                text.split_whitespace().collect()
-            };
-            // A row of names that is no comment.
-            let is_heading = std::mem::take(&mut is_first) && is_heading(cells[0]);
-            if !is_heading {
-                visit(line, &cells)?;
-            }
-        }
-    }
-}
-
-fn bad_line(line: usize, problem: impl Into<String>, table: &Path) -> ConvertError {
-    ConvertError::Line { line, problem: problem.into(), path: table.to_owned() }
-}
-
-fn stamp_of(line: usize, row: &[&str], table: &Path) -> Result<WrittenStamp, ConvertError> {
-    let text = row.first().copied().unwrap_or_default();
-    let stamp = read_stamp(text).filter(|stamp| *stamp >= 0);
-    stamp.ok_or_else(|| bad_line(line, format!("the stamp is '{text}', expected whole nanoseconds"), table))
-}
-
-/// First numbers after the stamp.
-fn numbers<const N: usize>(line: usize, row: &[&str], table: &Path) -> Result<[f64; N], ConvertError> {
-    let cells = row.get(1..=N).ok_or_else(|| {
-        bad_line(line, format!("{} numbers after the stamp, expected {N}", row.len().saturating_sub(1)), table)
-    })?;
-    let mut numbers = [0.0; N];
-    for (number, cell) in numbers.iter_mut().zip(cells) {
-        let value = cell.parse::<f64>().ok().filter(|value| value.is_finite());
-        *number = value.ok_or_else(|| bad_line(line, format!("'{cell}' is not a finite number"), table))?;
-    }
-    Ok(numbers)
-}
-
-fn read_imu(table: &Path) -> Result<Vec<Row>, ConvertError> {
-    let mut rows = Vec::new();
-    for_each_row(table, |line, row| {
-        let [wx, wy, wz, ax, ay, az] = numbers(line, row, table)?;
-        let sample = Sample::Imu {
-            angular_velocity_rad_per_s: Vector3::new(wx, wy, wz),
-            specific_force_m_per_s2: Vector3::new(ax, ay, az),
-        };
-        rows.push(Row { line, stamp: stamp_of(line, row, table)?, sample });
-        Ok(())
-    })?;
-    Ok(rows)
-}
-
-fn read_images(table: &Path, camera: usize) -> Result<Vec<Row>, ConvertError> {
-    let mut rows = Vec::new();
-    for_each_row(table, |line, row| {
-        let name = row.get(1).filter(|name| !name.is_empty());
-        let name = name.ok_or_else(|| bad_line(line, "no file name after the stamp", table))?;
-        let sample = Sample::Image { camera, name: (*name).to_owned() };
-        rows.push(Row { line, stamp: stamp_of(line, row, table)?, sample });
-        Ok(())
-    })?;
-    Ok(rows)
-}
-
-/// Reads poses of a sensor in the world (`p x y z`, `q w x y z`), transformed to the IMU.
-fn read_poses(table: &Path, source: usize, sensor_from_imu: &RigidTransform) -> Result<Vec<Row>, ConvertError> {
-    let mut rows = Vec::new();
-    for_each_row(table, |line, row| {
-        let [x, y, z, qw, qx, qy, qz] = numbers(line, row, table)?;
-        let quaternion = Quaternion::new(qw, qx, qy, qz);
-        if (quaternion.norm() - 1.0).abs() > 0.1 {
-            return Err(bad_line(line, format!("a quaternion of norm {:.3}, expected 1", quaternion.norm()), table));
-        }
-        let world_from_sensor = RigidTransform::new(UnitQuaternion::new_normalize(quaternion), Vector3::new(x, y, z));
-        let sample = Sample::Pose { source, world_from_imu: world_from_sensor * *sensor_from_imu };
-        rows.push(Row { line, stamp: stamp_of(line, row, table)?, sample });
-        Ok(())
-    })?;
-    Ok(rows)
 }

@@ -6,7 +6,9 @@
 
 mod error;
 mod euroc;
+mod euroc_rig;
 mod euroc_sensor;
+mod euroc_tables;
 mod mcap_segment;
 mod options;
 mod recording;
@@ -26,6 +28,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 pub use error::ConvertError;
+pub use euroc_rig::{EUROC_GIMBAL, EUROC_GROUND_TRUTH, EUROC_RIG, rig_of_euroc_folder};
 pub use options::{AutopilotLog, AutopilotLogKind, ConvertOptions, VideoClock};
 pub use report::{ConversionReport, ConvertedTopic};
 pub use source_kind::{SourceKind, source_kind};

@@ -99,9 +99,25 @@ impl CameraStream {
         pending: PendingImage,
         rotates: bool,
     ) -> Option<Arc<GrayImage>> {
-        let place = |problem: &str| {
-            format!("{}: image {} at {:.3} s skipped: {problem}", self.topic, pending.number, seconds_from_ns(stamp_ns))
-        };
+        let number = pending.number;
+        let image = self.decode_any(context, stamp_ns, pending)?;
+        let varies = image.pixels.first().is_some_and(|first| image.pixels.iter().any(|pixel| pixel != first));
+        if self.copies.is_copy(varies && self.previous.as_ref() == Some(&image), rotates) {
+            let message = self.skipped(number, stamp_ns, "it is a copy of the image before");
+            context.warn(WarningKind::ImageCopy, &self.topic, stamp_ns, message);
+            return None;
+        }
+        self.previous = Some(Arc::clone(&image));
+        Some(image)
+    }
+
+    /// Decoded image, also if it is a copy of the image before; `None` and a warning if it cannot be decoded.
+    pub(super) fn decode_any(
+        &self,
+        context: &mut ReadContext,
+        stamp_ns: i64,
+        pending: PendingImage,
+    ) -> Option<Arc<GrayImage>> {
         let decoded = match pending.content {
             ImageContent::Decoded(image) => Ok(image),
             ImageContent::Message(message) => {
@@ -110,26 +126,22 @@ impl CameraStream {
                 decode_image(self.kind, &message, narrowing, limits, Some(self.resolution_px))
             }
         };
-        let image = match decoded {
-            Ok(image) => Arc::new(image),
-            Err(problem) => {
-                let kind = match problem {
-                    ImageProblem::OtherResolution(_) => WarningKind::ImageSize,
-                    ImageProblem::Unreadable(_) => WarningKind::ImageUnreadable,
-                };
-                let message = place(&problem_text(problem, self.resolution_px, &self.key));
-                context.warn(kind, &self.topic, stamp_ns, message);
-                return None;
-            }
+        let problem = match decoded {
+            Ok(image) => return Some(Arc::new(image)),
+            Err(problem) => problem,
         };
-        let varies = image.pixels.first().is_some_and(|first| image.pixels.iter().any(|pixel| pixel != first));
-        if self.copies.is_copy(varies && self.previous.as_ref() == Some(&image), rotates) {
-            let message = place("it is a copy of the image before");
-            context.warn(WarningKind::ImageCopy, &self.topic, stamp_ns, message);
-            return None;
-        }
-        self.previous = Some(Arc::clone(&image));
-        Some(image)
+        let kind = match problem {
+            ImageProblem::OtherResolution(_) => WarningKind::ImageSize,
+            ImageProblem::Unreadable(_) => WarningKind::ImageUnreadable,
+        };
+        let problem = problem_text(problem, self.resolution_px, &self.key);
+        context.warn(kind, &self.topic, stamp_ns, self.skipped(pending.number, stamp_ns, &problem));
+        None
+    }
+
+    /// Text of a warning about an image that is skipped.
+    fn skipped(&self, number: usize, stamp_ns: i64, problem: &str) -> String {
+        format!("{}: image {number} at {:.3} s skipped: {problem}", self.topic, seconds_from_ns(stamp_ns))
     }
 }
 

@@ -262,13 +262,13 @@ fn joint_topic(rig: &Rig, camera: &CameraRig) -> Option<String> {
 }
 
 /// Half an interval between images, by the slower of the rig's rate and the log's mean rate.
-fn half_interval_ns(rig_rate_hz: f64, log_rate_hz: f64) -> i64 {
+pub(super) fn half_interval_ns(rig_rate_hz: f64, log_rate_hz: f64) -> i64 {
     let slower = [rig_rate_hz, log_rate_hz].into_iter().filter(|rate| *rate > 0.0).fold(f64::INFINITY, f64::min);
     if slower.is_finite() { ns_from_seconds(0.5 / slower) } else { i64::MAX }
 }
 
 /// Joint angles of the gimbal, `None` without a gimbal or encoders.
-fn joint_angles(
+pub(super) fn joint_angles(
     log: &Arc<FlightLog>,
     rig: &Rig,
     from_ns: i64,

@@ -31,6 +31,11 @@ impl GroundTruth {
         Some(Self { poses: Lookup::new(OrderedSamples::new(log, topic, from_ns, false, decoder)) })
     }
 
+    /// Next pose as recorded, `None` at the end of the log; not to be mixed with [`Self::at`].
+    pub(super) fn next(&mut self, context: &mut ReadContext) -> Option<PoseSample> {
+        self.poses.next(context)
+    }
+
     /// Pose interpolated at a stamp, `None` without one near it; stamps must not decrease.
     pub(super) fn at(&mut self, context: &mut ReadContext, stamp_ns: i64) -> Option<RigidTransform> {
         let [before, after] = self.poses.around(context, stamp_ns);

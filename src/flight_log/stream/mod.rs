@@ -14,6 +14,7 @@ mod joint_angles;
 mod joint_topic;
 mod ordered;
 mod read_context;
+mod sensor_samples;
 #[cfg(test)]
 mod tests;
 
@@ -22,6 +23,9 @@ use std::sync::mpsc::{Receiver, sync_channel};
 use std::thread::JoinHandle;
 
 use self::frames::FrameSource;
+pub use self::sensor_samples::{
+    RecordedImage, SensorSamples, ground_truth_poses, imu_samples, joint_samples, recorded_images,
+};
 use super::{FlightLog, LogError, LogWarning, SensorFrame, WarningKind};
 use crate::sensors::Rig;
 

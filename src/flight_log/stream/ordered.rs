@@ -151,6 +151,11 @@ impl<T> Lookup<T> {
         Self { samples, before: None, after: None, ended: false }
     }
 
+    /// Next sample of those that no call of [`Self::around`] has read.
+    pub(super) fn next(&mut self, context: &mut ReadContext) -> Option<T> {
+        self.samples.next(context).map(|(_, sample)| sample)
+    }
+
     /// Last sample at or before a time and the first after it; times must not decrease.
     pub(super) fn around(&mut self, context: &mut ReadContext, stamp_ns: i64) -> [Option<&(i64, T)>; 2] {
         while !self.ended && self.after.as_ref().is_none_or(|(after, _)| *after <= stamp_ns) {
