@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::{Args, ValueEnum};
 use dcvins::export;
-use dcvins::simulation::{self, Disturbances, Experiment, SimulationError, SimulationOptions};
+use dcvins::simulation::{self, Disturbances, Experiment, SimulationError, SimulationOptions, WorldKind};
 use dcvins::text::key_list;
 
 use crate::cli::exit::ExitOutcome;
@@ -21,6 +21,14 @@ pub(crate) struct SimulateArguments {
     /// The log to write; its rig and the ground truth of the rig get the same name with .rig.yaml and .truth.yaml.
     #[arg(short, long, visible_alias = "out", value_name = "LOG.mcap")]
     pub output: PathBuf,
+    /// Surfaces with texture.
+    #[arg(long, value_enum, value_name = "KIND", default_value = "textured")]
+    pub world: WorldArgument,
+    /// Swing the vehicle's heading by up to this angle in degrees to both sides of what there is to see, every 8 s, while
+    /// the gimbal keeps pointing at it: the house in T1 and T2, the street ahead in T3 and T4 [default: the
+    /// experiment's heading and gimbal].
+    #[arg(long, value_name = "DEG", value_parser = swing, conflicts_with = "motion")]
+    pub swing: Option<f64>,
     /// Mirror the path, so that T1 circles to the right instead of to the left.
     #[arg(long)]
     pub mirror: bool,
@@ -70,6 +78,17 @@ pub(crate) enum ExperimentArgument {
     T4,
 }
 
+/// Values of `--world`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum WorldArgument {
+    /// Texture in every direction.
+    Textured,
+    /// T1 and T2: a house on even ground with nothing else to see.
+    Plain,
+    /// T3 and T4: texture on buildings alone.
+    Facades,
+}
+
 /// Values of `--encoder-sigma-deg`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum EncoderArgument {
@@ -82,6 +101,11 @@ pub(crate) enum EncoderArgument {
 fn disturb_help() -> String {
     let keys = key_list(Disturbances::KEYS);
     format!("A disturbance, in seconds and SI units; may be given several times: {keys}")
+}
+
+fn swing(text: &str) -> Result<f64, String> {
+    let swing_deg = text.parse::<f64>().ok().filter(|swing_deg| (0.0..=90.0).contains(swing_deg));
+    swing_deg.ok_or_else(|| "expected degrees from 0 to 90".to_owned())
 }
 
 fn image_size(text: &str) -> Result<[usize; 2], String> {
@@ -104,6 +128,12 @@ pub(crate) fn simulate(arguments: &SimulateArguments) -> Result<ExitOutcome> {
         ExperimentArgument::T4 => Experiment::T4,
     };
     let mut options = SimulationOptions::new(experiment);
+    options.world = match arguments.world {
+        WorldArgument::Textured => WorldKind::Textured,
+        WorldArgument::Plain => WorldKind::Plain,
+        WorldArgument::Facades => WorldKind::Facades,
+    };
+    options.swing_rad = arguments.swing.map(f64::to_radians);
     options.mirrored = arguments.mirror;
     options.seed = arguments.seed;
     options.duration_s = arguments.duration;

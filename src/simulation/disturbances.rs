@@ -5,6 +5,7 @@ use std::ops::RangeInclusive;
 
 use super::interval::during;
 use super::vibration::Vibration;
+use crate::sensors::CameraMount;
 use crate::text::{FINITE, Field, Key, Numbers, read_item};
 
 /// Simulated sensor faults, calibration errors and degenerate motions; none by default.
@@ -29,6 +30,8 @@ pub struct Disturbances {
     pub accelerometer_range_m_per_s2: Option<f64>,
     pub light_change: Option<[f64; 2]>,
     pub blank_s: Option<[f64; 2]>,
+    pub blind_gimbal: Option<[f64; 3]>,
+    pub blind_static: Option<[f64; 3]>,
     pub gimbal_slew_s: Option<[f64; 2]>,
     pub fixed_joint: Option<[f64; 3]>,
     pub hover_s: Option<[f64; 2]>,
@@ -46,7 +49,7 @@ pub(crate) const EXPOSURE_DRIFT: f64 = 0.05;
 /// Time constant of the cameras' automatic exposure.
 const AUTO_EXPOSURE_S: f64 = 0.4;
 /// Grey value of the images in a blank interval.
-pub(crate) const BLANK_GREY: f32 = 150.0;
+const BLANK_GREY: f32 = 150.0;
 
 /// One or several numbers between commas.
 const fn key(
@@ -160,6 +163,21 @@ impl Disturbances {
             &[FINITE, FINITE],
         ),
         key(
+            "blind-gimbal",
+            "START,LENGTH,GREY",
+            "even images of this grey value from the gimbal camera alone: 0 as with a covered lens, 150 as of `blank`; their \
+             noise stays",
+            |it| &mut it.blind_gimbal,
+            &[FINITE, FINITE, 0.0..=255.0],
+        ),
+        key(
+            "blind-static",
+            "START,LENGTH,GREY",
+            "the same from the static camera alone",
+            |it| &mut it.blind_static,
+            &[FINITE, FINITE, 0.0..=255.0],
+        ),
+        key(
             "slew",
             "START,LENGTH",
             "the operator swings the gimbal's heading by 60° to each side, as fast as the motors follow (200°/s)",
@@ -252,8 +270,13 @@ impl Disturbances {
         }
     }
 
-    /// True if the images are blank at a time.
-    pub(crate) fn blank_at(&self, time_s: f64) -> bool {
-        during(self.blank_s, time_s)
+    /// Grey value of the images of a camera with this mount at a time, if they show nothing.
+    pub(crate) fn even_grey_at(&self, mount: &CameraMount, time_s: f64) -> Option<f32> {
+        if during(self.blank_s, time_s) {
+            return Some(BLANK_GREY);
+        }
+        let blind = if *mount == CameraMount::Gimbal { self.blind_gimbal } else { self.blind_static };
+        let [start_s, length_s, grey] = blind?;
+        during(Some([start_s, length_s]), time_s).then_some(grey as f32)
     }
 }

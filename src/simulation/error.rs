@@ -2,7 +2,9 @@
 
 use thiserror::Error;
 
+use super::experiment::{Experiment, WorldKind};
 use crate::flight_log::LogError;
+use crate::text::Named as _;
 
 /// Reason that a simulation ended without its files.
 #[derive(Debug, Error)]
@@ -17,6 +19,13 @@ pub enum SimulationError {
     /// An option out of its range.
     #[error("{option} is {value}: expected {low} to {high}")]
     BadOption { option: &'static str, value: f64, low: f64, high: f64 },
+    /// A world that the experiment's environment does not have.
+    #[error(
+        "{} has no world '{}': expected textured, {}",
+        experiment.name(), world.name(),
+        if *world == WorldKind::Plain { "or facades for T3 and T4" } else { "or plain for T1 and T2" }
+    )]
+    WrongWorld { world: WorldKind, experiment: Experiment },
     /// An image could not be compressed.
     #[error("cannot compress an image as JPEG: {problem}")]
     Image {

@@ -2,6 +2,7 @@
 
 use nalgebra::{Vector2, Vector3};
 
+use super::aim::Aim;
 use super::gimbal::LookAround;
 use super::random::RandomStream;
 use super::route::{Cruise, Flight, Manoeuvres, Path, Shuttle};
@@ -26,6 +27,34 @@ pub enum Environment {
     House,
     /// Environment 2: buildings and roads.
     Town,
+}
+
+/// Surfaces of an environment that have texture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum WorldKind {
+    /// Texture in every direction.
+    #[default]
+    Textured,
+    /// Environment 1 with its house alone, on even ground under an even sky.
+    Plain,
+    /// Environment 2 with its buildings alone, on even ground under an even sky.
+    Facades,
+}
+
+impl Named for WorldKind {
+    const NAMES: &'static [(Self, &'static str)] =
+        &[(Self::Textured, "textured"), (Self::Plain, "plain"), (Self::Facades, "facades")];
+}
+
+impl WorldKind {
+    /// Environment that has this variant, `None` for both.
+    pub(crate) fn environment(self) -> Option<Environment> {
+        match self {
+            Self::Textured => None,
+            Self::Plain => Some(Environment::House),
+            Self::Facades => Some(Environment::Town),
+        }
+    }
 }
 
 /// Side of a block of the town including half of the adjacent roads, in metres.
@@ -83,6 +112,13 @@ impl Experiment {
             // Calibration requires motion of all joints.
             Self::T4 => LookAround::new([0.0, 50.0], [-12.0, 18.0], 9.0, random),
         }
+    }
+
+    /// Direction of what there is to see, and a swing of this amplitude about it: the house in environment 1, the street
+    /// ahead in environment 2.
+    pub(crate) fn aim(self, swing_rad: f64) -> Aim {
+        let target_m = (self.environment() == Environment::House).then(Vector2::zeros);
+        Aim { target_m, swing_rad }
     }
 
     /// Flight of the experiment; a path that is not closed has at least this length.

@@ -2,11 +2,12 @@
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
+use super::aim::Aim;
 use super::exercise::Exercise;
 use super::interval::during;
 use super::random::RandomStream;
 use super::route::Wave;
-use super::trajectory::Trajectory;
+use super::trajectory::{Kinematics, Trajectory};
 use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::{ClassicalChain, DhLink};
 use crate::sensors::Joint;
@@ -63,6 +64,8 @@ pub(crate) struct LookAround {
     pub(crate) fixed_joint: Option<(usize, [f64; 2])>,
     /// Start and duration of an interval in which the camera keeps its orientation in the world exactly.
     pub(crate) stabilized_s: Option<[f64; 2]>,
+    /// Direction at which the camera points in place of the vehicle's heading.
+    pub(crate) aim: Option<Aim>,
     waves: [Wave; 3],
 }
 
@@ -76,6 +79,7 @@ impl LookAround {
             slew_s: None,
             fixed_joint: None,
             stabilized_s: None,
+            aim: None,
             waves: [Wave::new(random, 11.3), Wave::new(random, 9.1), Wave::new(random, 7.3)],
         }
     }
@@ -84,6 +88,22 @@ impl LookAround {
     pub(crate) fn mirrored(mut self) -> Self {
         self.yaw_rad[0] = -self.yaw_rad[0];
         self
+    }
+
+    /// Points at what there is to see, up to 12° to each side of a target.
+    pub(crate) fn aimed(mut self, aim: Aim) -> Self {
+        if aim.target_m.is_some() {
+            self.yaw_rad = [0.0, 12_f64.to_radians()];
+        }
+        Self { aim: Some(aim), ..self }
+    }
+
+    /// Heading that the camera follows at a time.
+    fn heading_to_follow_rad(&self, vehicle: &Kinematics, time_s: f64) -> f64 {
+        self.aim.map_or(vehicle.heading_rad, |aim| {
+            let route_rad = vehicle.heading_rad - aim.swing_at(time_s);
+            aim.direction_rad(&vehicle.world_from_imu.translation_m, route_rad)
+        })
     }
 
     /// A triangle wave of 60° to each side at the motors' largest rate while the camera is slewed.
@@ -153,7 +173,7 @@ impl JointMotion {
         stabilizer: &Stabilizer,
     ) -> Self {
         let steps = (trajectory.duration_s() / CONTROL_STEP_S).ceil() as usize + 2;
-        let mut followed_rad = trajectory.at(0.0).heading_rad;
+        let mut followed_rad = look.heading_to_follow_rad(&trajectory.at(0.0), 0.0);
         let mut angles = start_angles(trajectory, chain, look, followed_rad);
         let mut rates = [0.0; 3];
         let mut states = Vec::with_capacity(steps);
@@ -169,7 +189,8 @@ impl JointMotion {
                 rates = std::array::from_fn(|k| (angles[k] - before[k]) / CONTROL_STEP_S);
             }
             states.push((angles, rates));
-            followed_rad += (vehicle.heading_rad - followed_rad) * (CONTROL_STEP_S / stabilizer.follow_s);
+            followed_rad +=
+                (look.heading_to_follow_rad(&vehicle, time_s) - followed_rad) * (CONTROL_STEP_S / stabilizer.follow_s);
             let wanted = look.orientation(followed_rad, time_s);
             let asked =
                 joint_rates_towards(&vehicle.world_from_imu.rotation, chain, &angles, &wanted) * stabilizer.gain_per_s;

@@ -6,6 +6,7 @@
 
 #![cfg_attr(not(feature = "logs"), expect(dead_code, reason = "recorded flights use more than tracks do"))]
 
+mod aim;
 #[cfg(feature = "logs")]
 mod disturbances;
 mod equipment;
@@ -45,7 +46,7 @@ pub use equipment::{IntrinsicsError, Lens};
 #[cfg(feature = "logs")]
 pub use error::SimulationError;
 pub use exercise::{Exercise, JOINT_PERIOD_S, JointSwing, ROCK_M, ROCK_PERIOD_S, SWING_M, VehicleSwing, YAW_SWING_RAD};
-pub use experiment::{Environment, Experiment};
+pub use experiment::{Environment, Experiment, WorldKind};
 pub use gimbal::JointMotion;
 pub use imu::SimulatedBias;
 pub use motion::{MotionSample, MotionSplines, PrescribedMotion};

@@ -3,7 +3,7 @@ use std::path::PathBuf;
 use super::disturbances::Disturbances;
 use super::equipment::Lens;
 use super::error::SimulationError;
-use super::experiment::Experiment;
+use super::experiment::{Experiment, WorldKind};
 use super::motion::PrescribedMotion;
 use crate::sensors::ChainPrior;
 
@@ -11,6 +11,11 @@ use crate::sensors::ChainPrior;
 #[derive(Clone, Debug, PartialEq)]
 pub struct SimulationOptions {
     pub experiment: Experiment,
+    /// Surfaces with texture.
+    pub world: WorldKind,
+    /// Amplitude by which the vehicle's heading swings off what there is to see, at which the gimbal points; `None` for the
+    /// experiment's heading and gimbal.
+    pub swing_rad: Option<f64>,
     /// True if the path is mirrored at the x–z plane of the world: T1 then circles to the right.
     pub mirrored: bool,
     /// Seed of all random numbers.
@@ -45,6 +50,8 @@ impl SimulationOptions {
     pub fn new(experiment: Experiment) -> Self {
         Self {
             experiment,
+            world: WorldKind::Textured,
+            swing_rad: None,
             mirrored: false,
             seed: 1,
             duration_s: None,
@@ -68,6 +75,12 @@ impl SimulationOptions {
             let inside = value >= low && value <= high;
             inside.then_some(()).ok_or(SimulationError::BadOption { option, value, low, high })
         };
+        if self.world.environment().is_some_and(|environment| environment != self.experiment.environment()) {
+            return Err(SimulationError::WrongWorld { world: self.world, experiment: self.experiment });
+        }
+        if let Some(swing_rad) = self.swing_rad {
+            within("swing in degrees", swing_rad.to_degrees(), 0.0, 90.0)?;
+        }
         if let Some(duration_s) = self.duration_s {
             within("duration in seconds", duration_s, 0.5, 3600.0)?;
         }

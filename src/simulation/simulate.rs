@@ -9,10 +9,11 @@ use image::codecs::jpeg::JpegEncoder;
 use image::{ExtendedColorType, ImageEncoder as _};
 use rayon::prelude::*;
 
-use super::disturbances::{BLANK_GREY, EXPOSURE_DRIFT, VIGNETTING};
+use super::aim::Aimed;
+use super::disturbances::{EXPOSURE_DRIFT, VIGNETTING};
 use super::equipment::{Equipment, IntrinsicsError};
 use super::error::SimulationError;
-use super::experiment::Experiment;
+use super::experiment::{Experiment, WorldKind};
 use super::interval::during;
 use super::options::{SimulationOptions, SimulationProgress, SimulationSummary};
 use super::prescribed::PrescribedFlight;
@@ -125,6 +126,15 @@ fn fly_scenario(options: &SimulationOptions, name: &str) -> Result<Scenario, Sim
     if options.mirrored {
         flight = Box::new(Mirrored(flight));
         look = look.mirrored();
+    }
+    if let Some(swing_rad) = options.swing_rad {
+        if options.motion.is_some() {
+            let problem = "a swing changes the heading too; omit it".to_owned();
+            return Err(SimulationError::Motion { problem });
+        }
+        let aim = experiment.aim(swing_rad);
+        flight = Box::new(Aimed { flight, aim });
+        look = look.aimed(aim);
     }
     let prescribed = options.motion.as_ref().map(|motion| PrescribedFlight::new(motion, options)).transpose()?;
     let mut trajectory = match &prescribed {
@@ -243,7 +253,7 @@ fn write_messages(
 ) -> Result<usize, SimulationError> {
     let recordings = recordings(options, scenario);
     let schedule = schedule(&recordings, options.seed);
-    let world = world::build(options.experiment.environment(), options.seed);
+    let world = world::build(options.experiment.environment(), options.world, options.seed);
     let studio = Studio::new(options, scenario, &world);
     let rig = &scenario.true_rig;
     let joint_names = rig.joint_names();
@@ -426,12 +436,12 @@ impl<'a> Studio<'a> {
         let end_s = self.scenario.trajectory.duration_s();
         radiance.clear();
         radiance.resize(view.pixels(), 0.0);
-        let steps = match disturbances.exposure_s {
-            _ if disturbances.blank_at(time_s) => {
-                radiance.fill(BLANK_GREY);
+        let steps = match (disturbances.even_grey_at(&camera.mount, time_s), disturbances.exposure_s) {
+            (Some(grey), _) => {
+                radiance.fill(grey);
                 0
             }
-            exposure_s if exposure_s > 0.0 => BLUR_STEPS,
+            (None, exposure_s) if exposure_s > 0.0 => BLUR_STEPS,
             _ => 1,
         };
         for step in 0..steps {
@@ -495,6 +505,12 @@ fn ground_truth_notes(options: &SimulationOptions, scenario: &Scenario, chain_er
     entry("experiment", options.experiment.name().to_owned());
     entry("environment", environment.to_string());
     entry("seed", options.seed.to_string());
+    if options.world != WorldKind::Textured {
+        entry("world", options.world.name().to_owned());
+    }
+    if let Some(swing_rad) = options.swing_rad {
+        entry("swing", format!("{swing_rad:?}"));
+    }
     entry("epoch_ns", EPOCH_NS.to_string());
     entry("duration", format!("{duration_s:?}"));
     entry("path_length", format!("{:?}", scenario.trajectory.length_m(duration_s)));

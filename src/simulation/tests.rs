@@ -4,3 +4,4 @@ mod logs;
 mod prescribed;
 mod synthetic;
 mod tracking;
+mod uneven;

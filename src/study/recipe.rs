@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::sensors::ChainPrior;
-use crate::simulation::{Experiment, Lens, SimulationError, SimulationOptions};
+use crate::simulation::{Experiment, Lens, SimulationError, SimulationOptions, WorldKind};
 use crate::text::Named as _;
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -24,6 +24,12 @@ pub struct FlightRecipe {
     pub name: String,
     /// Name of the experiment, `T1` to `T4`.
     pub experiment: String,
+    /// `textured`, `plain` or `facades`; `None` for the first.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub world: Option<String>,
+    /// Swing of the vehicle's heading in degrees, `None` for the experiment's heading.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub swing_deg: Option<f64>,
     /// True if the path is mirrored: T1 then circles to the right.
     pub mirrored: bool,
     /// Duration in seconds, `None` for the experiment's.
@@ -56,12 +62,25 @@ impl FlightRecipe {
         if self.lens().is_none() {
             return Err(("lens", format!("is '{}', expected {}", self.lens, Lens::alternatives())));
         }
+        let Some(world) = self.world() else {
+            let found = self.world.as_deref().unwrap_or_default();
+            return Err(("world", format!("is '{found}', expected {}", WorldKind::alternatives())));
+        };
+        if let (Some(environment), Some(experiment)) = (world.environment(), self.experiment())
+            && environment != experiment.environment()
+        {
+            return Err(("world", SimulationError::WrongWorld { world, experiment }.to_string()));
+        }
         let options = self.options(1, &[]).map_err(|error| ("disturb", error.to_string()))?;
         options.check().map_err(|error| ("disturb", error.to_string()))
     }
 
     fn experiment(&self) -> Option<Experiment> {
         Experiment::from_name(&self.experiment)
+    }
+
+    fn world(&self) -> Option<WorldKind> {
+        self.world.as_deref().map_or(Some(WorldKind::Textured), WorldKind::from_name)
     }
 
     fn lens(&self) -> Option<Lens> {
@@ -74,6 +93,8 @@ impl FlightRecipe {
     /// For a disturbance that cannot be parsed.
     pub fn options(&self, seed: u64, disturb: &[String]) -> Result<SimulationOptions, SimulationError> {
         let mut options = SimulationOptions::new(self.experiment().unwrap_or(Experiment::T3));
+        options.world = self.world().unwrap_or_default();
+        options.swing_rad = self.swing_deg.map(f64::to_radians);
         options.mirrored = self.mirrored;
         options.seed = seed;
         options.duration_s = self.duration_s;

@@ -41,6 +41,8 @@ fn wrong_use_is_exit_code_2() {
     check(&["simulate", "T1", "--world", "facades", "-o", &path("x.mcap")], 1, &["T1", "'facades'", "plain"]);
     check(&["evaluate", "a.tum", "b.tum", "--delta", "3x"], 2, &["--delta", "10m"]);
     check(&["simulate", "T9", "-o", "x.mcap"], 2, &["T9", "t1"]);
+    check(&["simulate", "T1", "--world", "desert", "-o", "x.mcap"], 2, &["desert", "textured, plain, facades"]);
+    check(&["simulate", "T1", "--swing", "91", "-o", "x.mcap"], 2, &["91", "degrees from 0 to 90"]);
 }
 
 #[test]

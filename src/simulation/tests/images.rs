@@ -1,7 +1,7 @@
 use nalgebra::Vector3;
 
 use super::super::equipment::{Lens, camera_model};
-use super::super::experiment::{Environment, Experiment};
+use super::super::experiment::{Environment, Experiment, WorldKind};
 use super::super::random::RandomStream;
 use super::super::render::{RenderedView, Sensor, SensorOptions, SurfaceShader, Workspace};
 use super::super::world::{self, World};
@@ -11,7 +11,7 @@ use crate::sensors::GrayImage;
 use crate::text::Named as _;
 
 /// Image from a position along a heading, 8° down.
-fn radiance(world: &World, lens: Lens, place_m: [f64; 3], heading_deg: f64) -> GrayImage {
+pub(super) fn radiance(world: &World, lens: Lens, place_m: [f64; 3], heading_deg: f64) -> GrayImage {
     let view = RenderedView::new(&camera_model(0, lens, [640, 480]));
     let optical = nalgebra::Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
     let optical = nalgebra::UnitQuaternion::from_matrix(&optical);
@@ -32,7 +32,7 @@ fn radiance(world: &World, lens: Lens, place_m: [f64; 3], heading_deg: f64) -> G
 
 /// Number of cells of 32 × 32 pixels with a strong corner (smaller eigenvalue of the gradient's 7 × 7 structure
 /// tensor).
-fn cells_with_corners(image: &GrayImage) -> usize {
+pub(super) fn cells_with_corners(image: &GrayImage) -> usize {
     let at = |x: usize, y: usize| f64::from(image.pixels[y * image.width + x]);
     let mut cells = std::collections::BTreeSet::new();
     for y in (8..image.height - 8).step_by(3) {
@@ -61,7 +61,7 @@ fn cells_with_corners(image: &GrayImage) -> usize {
 #[test]
 fn both_worlds_have_many_corners_and_good_exposure() {
     for (environment, place_m) in [(Environment::House, [-13.0, -11.0, 2.6]), (Environment::Town, [-15.0, -4.0, 2.9])] {
-        let world = world::build(environment, 1);
+        let world = world::build(environment, WorldKind::Textured, 1);
         for lens in [Lens::Pinhole, Lens::Radtan] {
             for heading_deg in [0.0, 50.0, 90.0, 180.0] {
                 let image = radiance(&world, lens, place_m, heading_deg);
@@ -80,7 +80,7 @@ fn both_worlds_have_many_corners_and_good_exposure() {
 #[test]
 fn a_pixel_sees_what_its_ray_hits() {
     // A point of the house's corner edge projects to the image edge between two walls.
-    let world = world::build(Environment::House, 1);
+    let world = world::build(Environment::House, WorldKind::Textured, 1);
     let model = camera_model(0, Lens::Radtan, [640, 480]);
     let view = RenderedView::new(&model);
     let place = Vector3::new(-13.0, -11.0, 2.6);
@@ -115,7 +115,7 @@ fn a_pixel_sees_what_its_ray_hits() {
 fn textures_do_not_flicker_under_slow_motion() {
     // Between shifts of a hundredth of a pixel, a tracked patch must change smoothly: neighbouring images are much more
     // similar than images a pixel apart.
-    let world = world::build(Environment::Town, 1);
+    let world = world::build(Environment::Town, WorldKind::Textured, 1);
     let renderer = SurfaceShader::new(&world);
     let view = RenderedView::new(&camera_model(0, Lens::Pinhole, [320, 240]));
     let optical = nalgebra::Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
@@ -146,7 +146,7 @@ fn textures_do_not_flicker_under_slow_motion() {
 
 #[test]
 fn rows_rendered_apart_are_those_of_the_whole_image() {
-    let world = world::build(Environment::House, 1);
+    let world = world::build(Environment::House, WorldKind::Textured, 1);
     let renderer = SurfaceShader::new(&world);
     let optical = nalgebra::Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
     let rotation = nalgebra::UnitQuaternion::from_matrix(&optical) * so3::exp(&Vector3::new(0.1, 0.7, 0.2));
@@ -171,7 +171,7 @@ fn rows_rendered_apart_are_those_of_the_whole_image() {
 #[test]
 fn flights_keep_clear_of_everything_built() {
     for experiment in Experiment::all() {
-        let world = world::build(experiment.environment(), 1);
+        let world = world::build(experiment.environment(), WorldKind::Textured, 1);
         for seed in 1..4 {
             let trajectory = experiment_trajectory(experiment, seed, 160.0);
             for step in 0..800 {

@@ -5,11 +5,11 @@ use super::super::{Disturbances, Experiment, SimulationError, SimulationOptions,
 use crate::flight_log::{FlightLog, FrameStream};
 use crate::sensors::Rig;
 
-fn small(experiment: Experiment) -> SimulationOptions {
+pub(super) fn small(experiment: Experiment) -> SimulationOptions {
     SimulationOptions { duration_s: Some(1.0), resolution_px: [96, 72], ..SimulationOptions::new(experiment) }
 }
 
-fn write(options: &SimulationOptions, folder: &Path) -> SimulationSummary {
+pub(super) fn write(options: &SimulationOptions, folder: &Path) -> SimulationSummary {
     let mut last = 0;
     let summary = simulate(options, &folder.join("flight.mcap"), &mut |progress| {
         assert_eq!(progress.images_done, last + 1);
@@ -151,6 +151,8 @@ fn disturbances_are_read_as_they_are_written_on_the_command_line() {
         "exposure-drift=0.3",
         "light=4,0.5",
         "blank=5,1.5",
+        "blind-gimbal=3,2,0",
+        "blind-static=4,1,150",
         "slew=6,2",
         "spin=7,1,3.5",
         "hold-joint=2,8,1",
@@ -172,6 +174,8 @@ fn disturbances_are_read_as_they_are_written_on_the_command_line() {
         exposure_drift: Some(0.3),
         light_change: Some([4.0, 0.5]),
         blank_s: Some([5.0, 1.5]),
+        blind_gimbal: Some([3.0, 2.0, 0.0]),
+        blind_static: Some([4.0, 1.0, 150.0]),
         gimbal_slew_s: Some([6.0, 2.0]),
         spin: Some([7.0, 1.0, 3.5]),
         fixed_joint: Some([2.0, 8.0, 1.0]),

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::super::disturbances::{EXPOSURE_DRIFT, VIGNETTING};
-use super::super::experiment::Experiment;
+use super::super::experiment::{Experiment, WorldKind};
 use super::super::render::{RenderedView, Sensor, SensorOptions, SurfaceShader, Workspace};
 use super::super::world::{self, World};
 use super::flight::experiment_scenario;
@@ -81,7 +81,7 @@ impl Surface {
 fn tracks_follow_the_surfaces() {
     let experiment = Experiment::T1;
     let scenario = experiment_scenario(experiment, 1, 10.0, false);
-    let world = world::build(experiment.environment(), 1);
+    let world = world::build(experiment.environment(), WorldKind::Textured, 1);
     let camera = &scenario.true_rig.cameras[0];
     let (model, view, renderer) = (&camera.model, RenderedView::new(&camera.model), SurfaceShader::new(&world));
     let sensor =

@@ -6,7 +6,7 @@ use nalgebra::{Vector2, Vector3};
 
 use super::facade::{Front, front};
 use super::furniture::{Shell, bench, car, crates, fence, gable_roof, lamp, plain_house, walls};
-use super::landscape::{Palette, begin, bush, ground, hills, litter, tree};
+use super::landscape::{Palette, begin, bush, ground, hills, litter, tree, without_texture};
 use super::mesh::{MaterialId, World};
 use super::surface::{Wall, roof};
 use crate::simulation::random::RandomStream;
@@ -19,9 +19,16 @@ const RIDGE_M: f64 = 8.0;
 /// Distance of the fence from the centre.
 const FENCE_M: f64 = 22.5;
 
-pub(super) fn build(seed: u64) -> World {
+/// The house with its garden and its neighbours, or `alone` on even ground.
+pub(super) fn build(alone: bool, seed: u64) -> World {
     let random = &mut RandomStream::new(seed, 101);
     let (mut world, palette) = begin(Vector3::new(-0.45, -0.62, 0.72), 46.0, random);
+    if alone {
+        let even = without_texture(&mut world, &palette);
+        ground(&mut world, [-320.0, -320.0], [320.0, 320.0], 0.0, even.grass);
+        house(&mut world, &palette, random);
+        return world;
+    }
     ground(&mut world, [-320.0, -320.0], [320.0, 320.0], 0.0, palette.grass);
     hills(&mut world, &palette, random);
     house(&mut world, &palette, random);

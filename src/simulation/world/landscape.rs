@@ -2,6 +2,7 @@
 
 use nalgebra::{Vector2, Vector3};
 
+use super::canvas::Canvas;
 use super::mesh::{MaterialId, World};
 use super::surface;
 use crate::simulation::random::RandomStream;
@@ -42,6 +43,16 @@ pub(crate) fn begin(to_sun: Vector3<f64>, shadow_reach_m: f64, random: &mut Rand
     let asphalt = world.overlaid(asphalt, blotches);
     let slabs = world.overlaid(slabs, blotches);
     (world, Palette { grass, asphalt, slabs, leaves, bark, planks, concrete, light_metal, dark_metal, woods, paint })
+}
+
+/// Replaces the clouds, and in the palette all that covers the ground, by even grey values.
+pub(crate) fn without_texture(world: &mut World, palette: &Palette) -> Palette {
+    // Sides in metres and texels; any size gives the same.
+    let even = |grey: f32| Canvas::new(8.0, 8.0, 1.0, true, grey).finish();
+    let clouds = world.clouds;
+    world.textures[clouds] = even(128.0);
+    let ground = world.material(even(112.0));
+    Palette { grass: ground, asphalt: ground, slabs: ground, paint: ground, ..*palette }
 }
 
 /// Horizontal rectangle visible from above, from its lower left to its upper right corner.

@@ -13,12 +13,13 @@ mod town;
 pub(crate) use mesh::{Affine, Bounds, World};
 pub(crate) use texture::Footprints;
 
-use super::experiment::Environment;
+use super::experiment::{Environment, WorldKind};
 
-/// Builds a world; textures depend on the seed, the plan does not.
-pub(crate) fn build(environment: Environment, seed: u64) -> World {
+/// Builds a world; textures depend on the seed, the plan does not. Of a kind that the environment does not have, it is
+/// textured.
+pub(crate) fn build(environment: Environment, kind: WorldKind, seed: u64) -> World {
     match environment {
-        Environment::House => house::build(seed),
-        Environment::Town => town::build(seed),
+        Environment::House => house::build(kind == WorldKind::Plain, seed),
+        Environment::Town => town::build(kind == WorldKind::Facades, seed),
     }
 }

@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 
 use super::facade::{Front, front};
 use super::furniture::{bench, car, crates, lamp, walls};
-use super::landscape::{Palette, begin, ground, hills, litter, tree};
+use super::landscape::{Palette, begin, ground, hills, litter, tree, without_texture};
 use super::mesh::{MaterialId, World};
 use super::surface::Wall;
 use crate::simulation::experiment::{TOWN_PITCH_M, TOWN_ROADS};
@@ -28,22 +28,35 @@ struct Storeys {
     fronts: Vec<MaterialId>,
 }
 
-pub(super) fn build(seed: u64) -> World {
+/// The town, or its `buildings_alone` on even ground.
+pub(super) fn build(buildings_alone: bool, seed: u64) -> World {
     let random = &mut RandomStream::new(seed, 102);
-    let (mut world, palette) = begin(Vector3::new(0.52, -0.4, 0.8), 78.0, random);
+    let (mut world, mut palette) = begin(Vector3::new(0.52, -0.4, 0.8), 78.0, random);
+    if buildings_alone {
+        palette = without_texture(&mut world, &palette);
+    }
     ground(&mut world, [-320.0, -320.0], [320.0, 320.0], -0.05, palette.grass);
     let edge = 0.5 * TOWN_PITCH_M * TOWN_ROADS as f64 + 14.0;
     ground(&mut world, [-edge, -edge], [edge, edge], 0.0, palette.asphalt);
-    hills(&mut world, &palette, random);
+    if !buildings_alone {
+        hills(&mut world, &palette, random);
+    }
     let pool = paint_fronts(&mut world, random);
     let blocks = TOWN_ROADS as i32 + 1;
     for i in 0..blocks {
         for j in 0..blocks {
             let centre = |k: i32| (f64::from(k) - 0.5 * f64::from(blocks - 1)) * TOWN_PITCH_M;
-            block(&mut world, &palette, &pool, [centre(i), centre(j)], random);
+            let centre = [centre(i), centre(j)];
+            if buildings_alone {
+                bare_block(&mut world, &palette, &pool, centre, random);
+            } else {
+                block(&mut world, &palette, &pool, centre, random);
+            }
         }
     }
-    roads(&mut world, &palette, random);
+    if !buildings_alone {
+        roads(&mut world, &palette, random);
+    }
     world
 }
 
@@ -119,6 +132,19 @@ fn block(world: &mut World, palette: &Palette, pool: &[Storeys], centre: [f64; 2
             let at = place(random.uniform(-6.0, 6.0), BLOCK_HALF_M + 1.0);
             car(world, palette, at, towards + std::f64::consts::FRAC_PI_2, random);
         }
+    }
+}
+
+/// Block of buildings and nothing else; the kerb has no texture.
+fn bare_block(world: &mut World, palette: &Palette, pool: &[Storeys], centre: [f64; 2], random: &mut RandomStream) {
+    let around = |half: f64| ([centre[0] - half, centre[1] - half], [centre[0] + half, centre[1] + half]);
+    let (low, high) = around(BLOCK_HALF_M);
+    walls(world, low, high, [0.0, KERB_M], &[palette.slabs; 4]);
+    ground(world, low, high, KERB_M, palette.slabs);
+    for (sx, sy) in [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)] {
+        let lot = [centre[0] + 0.5 * sx * LOT_HALF_M, centre[1] + 0.5 * sy * LOT_HALF_M];
+        let back = random.uniform(0.0, 1.2) * f64::from(u8::from(random.chance(0.5)));
+        building(world, palette, pool, lot, [sx * back, sy * back], random);
     }
 }
 

@@ -151,6 +151,8 @@ fn flight(section: &Section<'_>) -> Result<FlightRecipe, PlanError> {
     section.allow(&[
         "name",
         "experiment",
+        "world",
+        "swing_deg",
         "mirrored",
         "duration_s",
         "encoder_sigma_deg",
@@ -179,6 +181,8 @@ fn flight(section: &Section<'_>) -> Result<FlightRecipe, PlanError> {
     let recipe = FlightRecipe {
         name,
         experiment,
+        world: section.text("world")?,
+        swing_deg: section.number("swing_deg", 0.0..=90.0)?,
         mirrored: section.boolean("mirrored")?.unwrap_or(false),
         duration_s: section.number("duration_s", 0.5..=3600.0)?,
         encoder: encoder.unwrap_or(EncoderNoise::OfExperiment),

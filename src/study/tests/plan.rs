@@ -171,6 +171,9 @@ fn errors_name_line_key_and_what_is_allowed() {
         "'flights[1].disturb[1]' is 'fog=1': disturbance 'fog=1': unknown key 'fog', expected one of",
     );
     check(&flight("lens = \"fisheye\""), "expected pinhole or radtan");
+    check(&flight("world = \"desert\""), "'flights[1].world' is 'desert', expected textured, plain or facades");
+    check(&flight("world = \"plain\""), "'flights[1].world' T3 has no world 'plain': expected textured, or facades");
+    check(&flight("swing_deg = 91"), "'flights[1].swing_deg' is 91");
     check(&flight("static_camera = 1"), "'flights[1].static_camera' is 1, expected true or false");
     check(&changes("quantity = \"gimbal.d\", magnitude = 1"), "expected one of gimbal.translation");
     check(
@@ -232,5 +235,8 @@ fn plans_of_the_documents_and_benches_are_read() {
     check("encoders", include_str!("../../../benches/paper_tables/encoders.toml"));
     check("robustness", include_str!("../../../benches/paper_tables/robustness.toml"));
     check("ablation", include_str!("../../../benches/paper_tables/ablation.toml"));
+    check("uneven", include_str!("../../../benches/paper_tables/uneven.toml"));
+    check("uneven_short", include_str!("../../../benches/paper_tables/uneven_short.toml"));
+    check("losing_sight", include_str!("../../../benches/paper_tables/losing_sight.toml"));
     check("regression", include_str!("../../../benches/regression/plan.toml"));
 }
