@@ -30,7 +30,7 @@ pub(crate) struct ConvertArguments {
     pub output: PathBuf,
     /// Format to write.
     #[arg(long = "to", value_enum, value_name = "FORMAT", default_value = "mcap")]
-    pub format: FormatArgument,
+    pub format: ConvertedFormat,
     /// With --to euroc: the rig of the log; default: next to the log or attached to it.
     #[arg(long, value_name = "FILE")]
     pub rig: Option<PathBuf>,
@@ -68,7 +68,7 @@ pub(crate) struct ConvertArguments {
 
 /// Values of `--to`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum FormatArgument {
+pub(crate) enum ConvertedFormat {
     /// A flight log.
     Mcap,
     /// A folder in EuRoC's (ASL) format, for other estimators.
@@ -104,11 +104,11 @@ impl ConvertArguments {
 
 pub(crate) fn convert(arguments: &ConvertArguments) -> Result<ExitOutcome> {
     match arguments.format {
-        FormatArgument::Mcap if arguments.rig.is_some() || !arguments.cameras.is_empty() => {
+        ConvertedFormat::Mcap if arguments.rig.is_some() || !arguments.cameras.is_empty() => {
             bail!("--rig and --camera are for --to euroc: a log has all cameras, and its rig lies next to it")
         }
-        FormatArgument::Mcap => convert_to_log(arguments),
-        FormatArgument::Euroc => convert_to_euroc(arguments),
+        ConvertedFormat::Mcap => convert_to_log(arguments),
+        ConvertedFormat::Euroc => convert_to_euroc(arguments),
     }
 }
 

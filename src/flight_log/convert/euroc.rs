@@ -12,8 +12,8 @@ use super::ConvertError;
 use super::euroc_rig::{EUROC_GIMBAL, EUROC_GROUND_TRUTH, JOINT_TOPIC, pose_topic, rig_in};
 use super::euroc_sensor::{CameraSensor, IMU_TOPIC, image_topic, rig_of, sensor_pose};
 use super::euroc_tables::{
-    SHORTEST_IMU_STEP_NS, SHORTEST_STEP_NS, Sample, for_each_row, in_nanoseconds, read_images, read_imu, read_joints,
-    read_poses,
+    EurocSample, SHORTEST_IMU_STEP_NS, SHORTEST_STEP_NS, for_each_row, in_nanoseconds, read_images, read_imu,
+    read_joints, read_poses,
 };
 use super::sink::LogSink;
 use crate::sensors::Rig;
@@ -38,7 +38,7 @@ pub(super) fn convert(source: &Path, sink: &mut LogSink<'_>) -> Result<Option<Ri
     let rig = rig_in(&root, sink);
     let joint_names = rig.as_ref().map(Rig::joint_names).unwrap_or_default();
     let mut folders = sensor_folders(&root)?;
-    let mut samples: Vec<(i64, Sample)> = Vec::new();
+    let mut samples: Vec<(i64, EurocSample)> = Vec::new();
     let mut cameras: Vec<CameraSensor> = Vec::new();
     let mut poses: Vec<String> = Vec::new();
     folders.retain(|name| {
@@ -108,15 +108,20 @@ struct FolderSensors {
     joint_names: Vec<String>,
 }
 
-fn write(stamp_ns: i64, sample: &Sample, sensors: &FolderSensors, sink: &mut LogSink<'_>) -> Result<(), ConvertError> {
+fn write(
+    stamp_ns: i64,
+    sample: &EurocSample,
+    sensors: &FolderSensors,
+    sink: &mut LogSink<'_>,
+) -> Result<(), ConvertError> {
     let FolderSensors { cameras, poses, joint_names } = sensors;
     let times = MessageTimes { stamp_ns, log_time_ns: stamp_ns };
     match sample {
-        Sample::Imu { angular_velocity_rad_per_s, specific_force_m_per_s2 } => {
+        EurocSample::Imu { angular_velocity_rad_per_s, specific_force_m_per_s2 } => {
             sink.writer.write_imu(IMU_TOPIC, "imu0", times, angular_velocity_rad_per_s, specific_force_m_per_s2)?;
             sink.taken(IMU_TOPIC, IMU_TYPE);
         }
-        Sample::Image { camera, name } => {
+        EurocSample::Image { camera, name } => {
             let CameraSensor { key, folder, .. } = &cameras[*camera];
             let topic = image_topic(key);
             match read_image_file(&folder.join("data"), name, sink.limits()) {
@@ -127,12 +132,12 @@ fn write(stamp_ns: i64, sample: &Sample, sensors: &FolderSensors, sink: &mut Log
                 Err(problem) => sink.leave(&topic, IMAGE_TYPE, 1, format!("{name:?} {problem}")),
             }
         }
-        Sample::Pose { source, world_from_imu } => {
+        EurocSample::Pose { source, world_from_imu } => {
             let topic = pose_topic(&poses[*source]);
             sink.writer.write_pose(&topic, "world", times, world_from_imu)?;
             sink.taken(&topic, POSE_TYPE);
         }
-        Sample::Joints { angles_rad } => {
+        EurocSample::Joints { angles_rad } => {
             sink.writer.write_joints(JOINT_TOPIC, times, joint_names, angles_rad)?;
             sink.taken(JOINT_TOPIC, JOINT_TYPE);
         }

@@ -19,26 +19,26 @@ pub(super) const SHORTEST_STEP_NS: i64 = 500_000;
 pub(super) const SHORTEST_IMU_STEP_NS: i64 = 50_000;
 
 /// Row of a table with its line and its stamp as written.
-pub(super) struct Row {
+pub(super) struct EurocRow {
     line: usize,
     stamp: WrittenStamp,
-    sample: Sample,
+    sample: EurocSample,
 }
 
 /// Samples of a table with stamps in nanoseconds; a note if the table has another unit.
 pub(super) fn in_nanoseconds(
-    rows: Vec<Row>,
+    rows: Vec<EurocRow>,
     shortest_step_ns: i64,
     table: &Path,
     name: &str,
     sink: &mut LogSink<'_>,
-) -> Result<Vec<(i64, Sample)>, ConvertError> {
+) -> Result<Vec<(i64, EurocSample)>, ConvertError> {
     let stamps: Vec<WrittenStamp> = rows.iter().map(|row| row.stamp).collect();
     let unit = StampUnit::of(&stamps, StampUnit::Nanoseconds, shortest_step_ns);
     if unit != StampUnit::Nanoseconds {
         sink.note(format!("the stamps of {name}/data.csv are in {}, which are converted to nanoseconds", unit.name()));
     }
-    let sample = |row: Row| {
+    let sample = |row: EurocRow| {
         let stamp_ns = unit.nanoseconds(row.stamp).filter(|stamp_ns| *stamp_ns >= 0);
         let problem = || format!("a stamp of {} {}, which no clock has", row.stamp / 1_000_000_000, unit.name());
         Ok((stamp_ns.ok_or_else(|| bad_line(row.line, problem(), table))?, row.sample))
@@ -47,7 +47,7 @@ pub(super) fn in_nanoseconds(
 }
 
 /// Row of any sensor.
-pub(super) enum Sample {
+pub(super) enum EurocSample {
     Imu {
         angular_velocity_rad_per_s: Vector3<f64>,
         specific_force_m_per_s2: Vector3<f64>,
@@ -137,38 +137,38 @@ fn read_numbers(line: usize, row: &[&str], numbers: &mut [f64], table: &Path) ->
     Ok(())
 }
 
-pub(super) fn read_joints(table: &Path, joints: usize) -> Result<Vec<Row>, ConvertError> {
+pub(super) fn read_joints(table: &Path, joints: usize) -> Result<Vec<EurocRow>, ConvertError> {
     let mut rows = Vec::new();
     for_each_row(table, |line, row| {
         let mut angles_rad = vec![0.0; joints];
         read_numbers(line, row, &mut angles_rad, table)?;
-        rows.push(Row { line, stamp: stamp_of(line, row, table)?, sample: Sample::Joints { angles_rad } });
+        rows.push(EurocRow { line, stamp: stamp_of(line, row, table)?, sample: EurocSample::Joints { angles_rad } });
         Ok(())
     })?;
     Ok(rows)
 }
 
-pub(super) fn read_imu(table: &Path) -> Result<Vec<Row>, ConvertError> {
+pub(super) fn read_imu(table: &Path) -> Result<Vec<EurocRow>, ConvertError> {
     let mut rows = Vec::new();
     for_each_row(table, |line, row| {
         let [wx, wy, wz, ax, ay, az] = numbers(line, row, table)?;
-        let sample = Sample::Imu {
+        let sample = EurocSample::Imu {
             angular_velocity_rad_per_s: Vector3::new(wx, wy, wz),
             specific_force_m_per_s2: Vector3::new(ax, ay, az),
         };
-        rows.push(Row { line, stamp: stamp_of(line, row, table)?, sample });
+        rows.push(EurocRow { line, stamp: stamp_of(line, row, table)?, sample });
         Ok(())
     })?;
     Ok(rows)
 }
 
-pub(super) fn read_images(table: &Path, camera: usize) -> Result<Vec<Row>, ConvertError> {
+pub(super) fn read_images(table: &Path, camera: usize) -> Result<Vec<EurocRow>, ConvertError> {
     let mut rows = Vec::new();
     for_each_row(table, |line, row| {
         let name = row.get(1).filter(|name| !name.is_empty());
         let name = name.ok_or_else(|| bad_line(line, "no file name after the stamp", table))?;
-        let sample = Sample::Image { camera, name: (*name).to_owned() };
-        rows.push(Row { line, stamp: stamp_of(line, row, table)?, sample });
+        let sample = EurocSample::Image { camera, name: (*name).to_owned() };
+        rows.push(EurocRow { line, stamp: stamp_of(line, row, table)?, sample });
         Ok(())
     })?;
     Ok(rows)
@@ -179,7 +179,7 @@ pub(super) fn read_poses(
     table: &Path,
     source: usize,
     sensor_from_imu: &RigidTransform,
-) -> Result<Vec<Row>, ConvertError> {
+) -> Result<Vec<EurocRow>, ConvertError> {
     let mut rows = Vec::new();
     for_each_row(table, |line, row| {
         let [x, y, z, qw, qx, qy, qz] = numbers(line, row, table)?;
@@ -188,8 +188,8 @@ pub(super) fn read_poses(
             return Err(bad_line(line, format!("a quaternion of norm {:.3}, expected 1", quaternion.norm()), table));
         }
         let world_from_sensor = RigidTransform::new(UnitQuaternion::new_normalize(quaternion), Vector3::new(x, y, z));
-        let sample = Sample::Pose { source, world_from_imu: world_from_sensor * *sensor_from_imu };
-        rows.push(Row { line, stamp: stamp_of(line, row, table)?, sample });
+        let sample = EurocSample::Pose { source, world_from_imu: world_from_sensor * *sensor_from_imu };
+        rows.push(EurocRow { line, stamp: stamp_of(line, row, table)?, sample });
         Ok(())
     })?;
     Ok(rows)

@@ -24,16 +24,16 @@ pub struct RecordedImage {
 }
 
 /// Next sample of a sensor, `None` at the end of the log.
-type Source<T> = Box<dyn FnMut(&mut ReadContext) -> Option<T>>;
+type NextSample<T> = Box<dyn FnMut(&mut ReadContext) -> Option<T>>;
 
 /// Samples of one sensor in the order of their stamps, read chunk by chunk.
 pub struct SensorSamples<T> {
     context: ReadContext,
-    source: Source<T>,
+    source: NextSample<T>,
 }
 
 impl<T> SensorSamples<T> {
-    fn new(log: &Arc<FlightLog>, source: Source<T>) -> Self {
+    fn new(log: &Arc<FlightLog>, source: NextSample<T>) -> Self {
         Self { context: ReadContext::new(Arc::clone(log)), source }
     }
 
