@@ -37,6 +37,7 @@ const DOCUMENTS: [Document; 29] = [
     document!("docs/experiments/encoders_and_joint_angles.md"),
     document!("docs/experiments/gimbal_imu.md"),
     document!("docs/experiments/robustness.md"),
+    document!("docs/experiments/uneven_scenes.md"),
     document!("docs/experiments/second_pass_and_first_seconds.md"),
     document!("docs/experiments/solver_and_first_window.md"),
     document!("docs/experiments/shutters_and_intrinsics.md"),
