@@ -87,7 +87,7 @@ impl<'a> GimbalImuFactor<'a> {
         Some(Self {
             slot,
             motion,
-            information: motion.information.as_ref()?,
+            information: motion.information()?,
             gravity_in_world: point.gravity_in_world,
             states,
             columns: [slot - 1, slot].map(|slot| (layout.pose(slot).start, layout.gimbal_imu(slot).start)),
@@ -97,7 +97,7 @@ impl<'a> GimbalImuFactor<'a> {
 
     /// States at the times of the measurements that bound the interval.
     fn bounds(&self, mount: &GimbalImuMount, [from, to]: [&NavigationState; 2]) -> Option<[NavigationState; 2]> {
-        let samples = self.motion.motion.samples();
+        let samples = self.motion.samples();
         let (first, last) = (samples.first()?, samples.last()?);
         Some([mount.shifted(from, first, self.gravity_in_world), mount.shifted(to, last, self.gravity_in_world)])
     }
@@ -106,8 +106,8 @@ impl<'a> GimbalImuFactor<'a> {
     fn derivatives(&self, linearized: &Linearized) -> Option<Derivatives> {
         let ends = [&linearized.states[self.slot - 1], &linearized.states[self.slot]];
         let [from, to] = self.bounds(&linearized.mount, ends.map(|(state, ..)| state))?;
-        let [by_from, by_to, _] = jacobians(&self.motion.motion, &from, &to, self.gravity_in_world, None);
-        let samples = self.motion.motion.samples();
+        let [by_from, by_to, _] = jacobians(self.motion, &from, &to, self.gravity_in_world, None);
+        let samples = self.motion.samples();
         let mut by_calibration = DMatrix::zeros(15, ends[0].2.ncols());
         let mut by_shift = Vector15::zeros();
         let mut by_frames = Vec::with_capacity(2);
@@ -116,8 +116,9 @@ impl<'a> GimbalImuFactor<'a> {
             ends.into_iter().zip(ends_of_samples).zip([by_from, by_to])
         {
             let (by_state, by_time) = linearized.mount.shift_maps(state, sample, self.gravity_in_world);
-            by_shift += self.information * by_bound * by_time;
-            let by_state = self.information * by_bound * by_state;
+            let by_bound = self.information * by_bound;
+            by_shift += by_bound * by_time;
+            let by_state = by_bound * by_state;
             let (by_pose, by_own) = by_state.as_slice().split_at(15 * POSE);
             let by_pose = DMatrix::from_column_slice(15, POSE, by_pose);
             by_calibration += &by_pose * of_calibration;
@@ -138,7 +139,7 @@ impl Factor for GimbalImuFactor<'_> {
     fn rows<S: Sink>(&self, sink: &mut S) {
         let current = [&self.states.current[self.slot - 1], &self.states.current[self.slot]];
         let Some([from, to]) = self.bounds(&self.states.mount, current) else { return };
-        let residual = self.information * residual(&self.motion.motion, &from, &to, self.gravity_in_world, None);
+        let residual = self.information * residual(self.motion, &from, &to, self.gravity_in_world, None);
         let mut rows = WhitenedRows { residual: residual.as_slice(), blocks: &[], products: None };
         if !S::DERIVATIVES {
             return sink.add(self.label(), &rows);

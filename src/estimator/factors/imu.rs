@@ -42,7 +42,7 @@ impl<'a> ImuFactor<'a> {
         Some(Self {
             slot,
             motion: &frame.motion,
-            information: frame.motion_information.as_ref()?,
+            information: frame.motion.information()?,
             gravity_in_world: point.gravity_in_world,
             current: states(&point.at.frames),
             linearized: states(point.linearized),

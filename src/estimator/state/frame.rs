@@ -1,10 +1,13 @@
 //! A frame of the window with its measurements.
 
+use std::ops::Deref;
+
 use super::frame_state::FrameState;
+use super::imu_errors::ImuErrors;
 use super::layout::{Layout, VELOCITY_BIAS};
-use super::navigation::Matrix15;
+use super::navigation::{ImuBias, Matrix15};
 use super::preintegration::Preintegration;
-use crate::sensors::JointAngles;
+use crate::sensors::{ImuSample, JointAngles};
 
 /// Zero-velocity update of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,17 +20,42 @@ pub(crate) struct Stationary {
     pub(crate) velocity_sigma_m_per_s: f64,
 }
 
-/// Preintegrated samples with their square-root information.
+/// Preintegrated samples with their square-root information, which follows every change of them.
 #[derive(Clone, Debug)]
 pub(crate) struct InformedMotion {
-    pub(crate) motion: Preintegration,
-    /// Square-root information of `motion` (15 × 15), `None` if it is empty.
-    pub(crate) information: Option<Matrix15>,
+    preintegration: Preintegration,
+    information: Option<Matrix15>,
 }
 
 impl InformedMotion {
-    pub(crate) fn new(motion: Preintegration) -> Self {
-        Self { information: motion.square_root_information(), motion }
+    pub(crate) fn new(preintegration: Preintegration) -> Self {
+        Self { information: preintegration.square_root_information(), preintegration }
+    }
+
+    /// Square-root information (15 × 15), `None` without samples.
+    pub(crate) fn information(&self) -> Option<&Matrix15> {
+        self.information.as_ref()
+    }
+
+    /// These samples and those of the next interval, integrated with this bias.
+    pub(crate) fn followed_by(self, samples: &[ImuSample]) -> Self {
+        let mut joined = self.preintegration;
+        joined.extend(samples);
+        Self::new(joined)
+    }
+
+    /// Integrates the samples again with another bias and other intrinsics.
+    pub(crate) fn reintegrate(&mut self, bias: ImuBias, errors: Option<ImuErrors>) {
+        self.preintegration.reintegrate_with(bias, errors);
+        self.information = self.preintegration.square_root_information();
+    }
+}
+
+impl Deref for InformedMotion {
+    type Target = Preintegration;
+
+    fn deref(&self) -> &Preintegration {
+        &self.preintegration
     }
 }
 
@@ -45,9 +73,7 @@ pub(crate) struct Frame {
     pub(crate) stationary: Option<Stationary>,
     pub(crate) keyframe: bool,
     /// Preintegrated IMU samples since the previous frame of the window.
-    pub(crate) motion: Preintegration,
-    /// Square-root information of `motion` (15 × 15), `None` when it is empty.
-    pub(crate) motion_information: Option<Matrix15>,
+    pub(crate) motion: InformedMotion,
     /// Samples of the IMU on the gimbal since the previous frame of the window; `None` without one, or where some are
     /// missing.
     pub(crate) gimbal_motion: Option<InformedMotion>,
@@ -70,8 +96,7 @@ impl Frame {
             encoder,
             stationary: None,
             keyframe: true,
-            motion_information: motion.square_root_information(),
-            motion,
+            motion: InformedMotion::new(motion),
             gimbal_motion: None,
         }
     }

@@ -5,7 +5,7 @@ use std::ops::{Deref, DerefMut};
 use nalgebra::SVector;
 
 use crate::estimator::config::EstimatorOptions;
-use crate::estimator::state::frame::{Frame, InformedMotion};
+use crate::estimator::state::frame::Frame;
 use crate::estimator::state::imu_errors::ImuErrors;
 
 /// Change of a scale error, a misalignment or the rotation in radians above which an interval is integrated again:
@@ -54,16 +54,11 @@ impl Frames {
         if slot >= self.newest_slot() {
             return;
         }
-        let Frame { mut motion, gimbal_motion, .. } = self.0.remove(slot);
+        let Frame { motion, gimbal_motion, .. } = self.0.remove(slot);
         let next = &mut self.0[slot];
-        next.gimbal_motion = gimbal_motion.zip(next.gimbal_motion.take()).map(|(before, after)| {
-            let mut joined = before.motion;
-            joined.extend(after.motion.samples());
-            InformedMotion::new(joined)
-        });
-        motion.extend(next.motion.samples());
-        next.motion_information = motion.square_root_information();
-        next.motion = motion;
+        next.motion = motion.followed_by(next.motion.samples());
+        let of_gimbal = gimbal_motion.zip(next.gimbal_motion.take());
+        next.gimbal_motion = of_gimbal.map(|(before, after)| before.followed_by(after.samples()));
     }
 
     /// Integrates intervals again if, since their integration, the IMU intrinsics changed by more than
@@ -79,16 +74,14 @@ impl Frames {
                 gyroscope.max() > 0.0 || accelerometer.max() > 0.0
             };
             if let (Some(own), Some(gimbal)) = (own, &mut frame.gimbal_motion)
-                && exceeds(gimbal.motion.bias_change(&own.bias))
+                && exceeds(gimbal.bias_change(&own.bias))
             {
-                gimbal.motion.reintegrate(own.bias);
-                gimbal.information = gimbal.motion.square_root_information();
+                gimbal.reintegrate(own.bias, None);
             }
             let intrinsics_change = frame.motion.intrinsics_change(intrinsics).map_or(0.0, |change| change.amax());
             let reaches = intrinsics_change > REINTEGRATION_INTRINSICS_CHANGE;
             if exceeds(frame.motion.bias_change(&bias)) || reaches {
-                frame.motion.reintegrate_with(bias, intrinsics.copied());
-                frame.motion_information = frame.motion.square_root_information();
+                frame.motion.reintegrate(bias, intrinsics.copied());
             }
         }
     }

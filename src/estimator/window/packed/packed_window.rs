@@ -43,8 +43,6 @@ struct PackedFrame {
     keyframe: bool,
     motion: PackedMotion,
     gimbal_motion: Option<PackedMotion>,
-    /// True if `motion_information` is present.
-    informed: bool,
 }
 
 /// IMU whose samples are packed.
@@ -146,8 +144,7 @@ impl PackedFrame {
             gimbal_motion: frame
                 .gimbal_motion
                 .as_ref()
-                .map(|gimbal| PackedMotion::new(&gimbal.motion, past, PackedImu::Gimbal)),
-            informed: frame.motion_information.is_some(),
+                .map(|gimbal| PackedMotion::new(gimbal, past, PackedImu::Gimbal)),
         }
     }
 
@@ -162,8 +159,7 @@ impl PackedFrame {
             encoder: self.encoder.clone(),
             stationary: self.stationary,
             keyframe: self.keyframe,
-            motion_information: self.informed.then(|| motion.square_root_information()).flatten(),
-            motion,
+            motion: InformedMotion::new(motion),
             gimbal_motion: gimbal_motion.map(InformedMotion::new),
         }
     }
