@@ -263,6 +263,8 @@ impl Named for Quantity {
 }
 
 impl Quantity {
+    /// Columns of a rotation vector.
+    pub const ROTATION: [Self; 3] = [Self::Rx, Self::Ry, Self::Rz];
     /// Columns of a rigid transform: rotation vector, then translation.
     pub const TRANSFORM: [Self; 6] = [Self::Rx, Self::Ry, Self::Rz, Self::Tx, Self::Ty, Self::Tz];
     /// Columns of a Denavit–Hartenberg link.

@@ -38,7 +38,7 @@ pub(crate) fn true_values(recording: &Recording, run: &RunRecord, stamp_ns: i64)
 /// replaced by the complementary rotation about the opposite axis.
 pub(crate) fn unwrap_towards(values: &mut ParameterValues, reference: &ParameterValues) {
     let parts: BTreeSet<ParameterPart> = values.keys().map(|parameter| parameter.part).collect();
-    let rotation_vector = |part: ParameterPart| AXES.map(|quantity| ParameterId { part, quantity });
+    let rotation_vector = |part: ParameterPart| Quantity::ROTATION.map(|quantity| ParameterId { part, quantity });
     let blocks: Vec<ParameterPart> =
         parts.into_iter().filter(|part| rotation_vector(*part).iter().all(|axis| values.contains_key(axis))).collect();
     for block in &blocks {
@@ -64,9 +64,6 @@ pub(crate) fn unwrap_towards(values: &mut ParameterValues, reference: &Parameter
         }
     }
 }
-
-/// The components of a rotation vector.
-const AXES: [Quantity; 3] = [Quantity::Rx, Quantity::Ry, Quantity::Rz];
 
 #[cfg(test)]
 mod tests {

@@ -43,8 +43,7 @@ mod tests {
     use crate::observability::{CalibrationDirection, PackedFactor};
 
     fn parameters() -> [ParameterId; 3] {
-        [Quantity::Rx, Quantity::Ry, Quantity::Rz]
-            .map(|quantity| ParameterId { part: ParameterPart::ImuFromCamera(0), quantity })
+        Quantity::ROTATION.map(|quantity| ParameterId { part: ParameterPart::ImuFromCamera(0), quantity })
     }
 
     fn report(directions: &[[f64; 3]]) -> RankReport {

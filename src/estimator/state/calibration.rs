@@ -223,7 +223,7 @@ impl Calibration {
     /// Correction of the orientation of the IMU on the gimbal, as a rotation vector; zero without columns.
     pub(crate) fn gimbal_imu_rotation(&self) -> Vector3<f64> {
         let value = |quantity| self.sensor_value(ParameterId { part: ParameterPart::GimbalImu, quantity });
-        Vector3::new(value(Quantity::Rx), value(Quantity::Ry), value(Quantity::Rz))
+        Quantity::ROTATION.map(value).into()
     }
 
     /// First of the three columns of [`Self::gimbal_imu_rotation`], `None` if they are fixed.

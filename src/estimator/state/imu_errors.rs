@@ -14,7 +14,7 @@ pub(crate) type ImuErrors = SVector<f64, IMU_ERRORS>;
 
 pub(crate) fn parameters() -> Vec<ParameterId> {
     let of = |part: ParameterPart| move |quantity: Quantity| ParameterId { part, quantity };
-    let gyroscope = Quantity::SCALE_MISALIGNMENT.into_iter().chain([Quantity::Rx, Quantity::Ry, Quantity::Rz]);
+    let gyroscope = Quantity::SCALE_MISALIGNMENT.into_iter().chain(Quantity::ROTATION);
     let gyroscope = gyroscope.map(of(ParameterPart::Gyroscope));
     gyroscope.chain(Quantity::SCALE_MISALIGNMENT.map(of(ParameterPart::Accelerometer))).collect()
 }

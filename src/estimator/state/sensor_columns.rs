@@ -40,7 +40,7 @@ impl SensorColumn {
 
     /// Orientation of the IMU on the gimbal, as a rotation vector relative to the rig's, and its time offset.
     pub(crate) fn gimbal_imu(given_timeshift_s: f64) -> Vec<Self> {
-        let rotation = [Quantity::Rx, Quantity::Ry, Quantity::Rz].map(|quantity| Self {
+        let rotation = Quantity::ROTATION.map(|quantity| Self {
             parameter: ParameterId { part: ParameterPart::GimbalImu, quantity },
             given: 0.0,
             sigma: GIMBAL_IMU_ROTATION_SIGMA_RAD,

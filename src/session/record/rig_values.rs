@@ -109,9 +109,6 @@ fn has_imu_columns(estimate: &CalibrationEstimate) -> bool {
     estimate.parameters.iter().any(|parameter| is_intrinsic(parameter.part))
 }
 
-/// Columns of the rotation vector of the gimbal's IMU.
-const GIMBAL_IMU_ROTATION: [Quantity; 3] = [Quantity::Rx, Quantity::Ry, Quantity::Rz];
-
 /// A rig's values of those of `parameters` that belong to the IMU on the gimbal: its orientation relative to `given`, and
 /// its time offset.
 fn gimbal_imu_columns(rig: &Rig, given: &Rig, parameters: &[ParameterId]) -> Vec<(ParameterId, f64)> {
@@ -119,7 +116,7 @@ fn gimbal_imu_columns(rig: &Rig, given: &Rig, parameters: &[ParameterId]) -> Vec
     let rotation = so3::log(&(given.camera_from_imu.rotation.inverse() * imu.camera_from_imu.rotation));
     let value = |quantity: Quantity| match quantity {
         Quantity::Timeshift => Some(imu.timeshift_s),
-        _ => GIMBAL_IMU_ROTATION.iter().position(|known| *known == quantity).map(|axis| rotation[axis]),
+        _ => Quantity::ROTATION.iter().position(|known| *known == quantity).map(|axis| rotation[axis]),
     };
     let own = parameters.iter().filter(|parameter| parameter.part == ParameterPart::GimbalImu);
     own.filter_map(|parameter| Some((*parameter, value(parameter.quantity)?))).collect()
@@ -132,7 +129,7 @@ fn set_gimbal_imu(rig: &mut Rig, columns: &[(ParameterId, f64)]) {
         columns.iter().find(|(parameter, _)| *parameter == wanted).map(|(_, value)| *value)
     };
     let Some(imu) = &mut rig.gimbal_imu else { return };
-    if let [Some(x), Some(y), Some(z)] = GIMBAL_IMU_ROTATION.map(value) {
+    if let [Some(x), Some(y), Some(z)] = Quantity::ROTATION.map(value) {
         imu.camera_from_imu.rotation *= so3::exp(&Vector3::new(x, y, z));
     }
     imu.timeshift_s = value(Quantity::Timeshift).unwrap_or(imu.timeshift_s);

@@ -61,7 +61,7 @@ pub(super) fn all_parameters() -> Vec<ParameterId> {
     let mut parameters = vec![ParameterId::timeshift(0), ParameterId::readout(0), ParameterId::ENCODER_TIMESHIFT];
     parameters.extend(Quantity::INTRINSICS.map(of(ParameterPart::Camera(0))));
     parameters.extend(Quantity::SCALE_MISALIGNMENT.map(of(ParameterPart::Gyroscope)));
-    parameters.extend([Quantity::Rx, Quantity::Ry, Quantity::Rz].map(of(ParameterPart::Gyroscope)));
+    parameters.extend(Quantity::ROTATION.map(of(ParameterPart::Gyroscope)));
     parameters.extend(Quantity::SCALE_MISALIGNMENT.map(of(ParameterPart::Accelerometer)));
     parameters
 }
