@@ -495,8 +495,6 @@ fn ground_truth_notes(options: &SimulationOptions, scenario: &Scenario, chain_er
         super::Environment::Town => 2,
     };
     let duration_s = scenario.trajectory.duration_s();
-    let first = scenario.imu_record.biases.first().copied().unwrap_or_default();
-    let last = scenario.imu_record.biases.last().copied().unwrap_or_default();
     let mut notes = String::from("truth:\n");
     let mut entry = |name: &str, value: String| {
         // Writing into a string cannot fail.
@@ -514,16 +512,13 @@ fn ground_truth_notes(options: &SimulationOptions, scenario: &Scenario, chain_er
     entry("epoch_ns", EPOCH_NS.to_string());
     entry("duration", format!("{duration_s:?}"));
     entry("path_length", format!("{:?}", scenario.trajectory.length_m(duration_s)));
-    entry("gyroscope_bias_start", list(&first.gyroscope_rad_per_s));
-    entry("gyroscope_bias_end", list(&last.gyroscope_rad_per_s));
-    entry("accelerometer_bias_start", list(&first.accelerometer_m_per_s2));
-    entry("accelerometer_bias_end", list(&last.accelerometer_m_per_s2));
-    if let Some(record) = &scenario.gimbal_imu_record {
+    let of_gimbal = scenario.gimbal_imu_record.as_ref().map(|record| ("gimbal_", record));
+    for (imu, record) in std::iter::once(("", &scenario.imu_record)).chain(of_gimbal) {
         let [first, last] = [record.biases.first(), record.biases.last()].map(|bias| bias.copied().unwrap_or_default());
-        entry("gimbal_gyroscope_bias_start", list(&first.gyroscope_rad_per_s));
-        entry("gimbal_gyroscope_bias_end", list(&last.gyroscope_rad_per_s));
-        entry("gimbal_accelerometer_bias_start", list(&first.accelerometer_m_per_s2));
-        entry("gimbal_accelerometer_bias_end", list(&last.accelerometer_m_per_s2));
+        entry(&format!("{imu}gyroscope_bias_start"), list(&first.gyroscope_rad_per_s));
+        entry(&format!("{imu}gyroscope_bias_end"), list(&last.gyroscope_rad_per_s));
+        entry(&format!("{imu}accelerometer_bias_start"), list(&first.accelerometer_m_per_s2));
+        entry(&format!("{imu}accelerometer_bias_end"), list(&last.accelerometer_m_per_s2));
     }
     entry("air_drag_per_s", format!("{AIR_DRAG_PER_S:?}"));
     entry("given_chain_error", format!("{{translation_m: {:?}, rotation_rad: {:?}}}", chain_error.0, chain_error.1));

@@ -1,7 +1,7 @@
 //! Small videos of gimbal cameras, for the tests of `convert` and the seeds of its fuzz targets: telemetry in SEI messages,
 //! subtitles and motion tracks, and fragments.
 
-use super::recorders::{Track, mp4_box};
+use super::recorders::{Track, describe_records, floats, mp4_box, put_record};
 
 /// Identifier of the messages of `AP_CameraGimbal`.
 const UUID: [u8; 16] = [0x8d, 0x64, 0x6b, 0x4e, 0x55, 0x6f, 0x4a, 0x90, 0x8b, 0x7c, 0x35, 0xe6, 0x29, 0x51, 0x03, 0x21];
@@ -102,28 +102,15 @@ pub(crate) fn fragmented(track: &Track<'_>) -> Vec<u8> {
 
 /// A `DataFlash` log of `AP_CameraGimbal`: angles at 10 Hz, position and UTC.
 pub(crate) fn camera_log(samples: usize, angles_deg: [f64; 3]) -> Vec<u8> {
-    let padded = |text: &str, length: usize| {
-        let mut bytes = text.as_bytes().to_vec();
-        bytes.resize(length, 0);
-        bytes
-    };
-    let floats = |values: &[f64]| values.iter().flat_map(|value| (*value as f32).to_le_bytes()).collect::<Vec<u8>>();
     let mut out = Vec::new();
-    let mut record = |kind: u8, content: &[&[u8]]| {
-        out.extend([0xA3, 0x95, kind]);
-        for part in content {
-            out.extend_from_slice(part);
-        }
-    };
     let types = [
         (133, "GIMB", "QQffffff", "TimeUS,SampleUS,Roll,Pitch,Yaw,RollRate,PitchRate,YawRate", 43),
         (132, "ATT", "QIBffffff", "TimeUS,BootMS,Src,Roll,Pitch,Yaw,RollRate,PitchRate,YawRate", 40),
         (131, "POS", "QILLfffff", "TimeUS,BootMS,Lat,Lng,Alt,RelAlt,VN,VE,VD", 43),
         (142, "TIME", "QQ", "TimeUS,UTC", 19),
     ];
-    for (kind, name, format, columns, length) in types {
-        record(128, &[&[kind, length], &padded(name, 4), &padded(format, 16), &padded(columns, 64)]);
-    }
+    describe_records(&mut out, &types);
+    let mut record = |kind: u8, content: &[&[u8]]| put_record(&mut out, kind, content);
     for index in 0..samples as u64 {
         let time = (2_000_000 + 100_000 * index).to_le_bytes();
         // Measured 20 ms before.

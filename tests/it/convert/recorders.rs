@@ -25,7 +25,7 @@ pub(crate) const PERIOD_US: u64 = 4_000;
 /// UTC of the first sample in seconds since the epoch: 10 June 2024, 00:00:00.
 pub(crate) const START_UTC_S: u64 = 1_717_977_600;
 
-fn floats(values: &[f64]) -> Vec<u8> {
+pub(crate) fn floats(values: &[f64]) -> Vec<u8> {
     values.iter().flat_map(|value| (*value as f32).to_le_bytes()).collect()
 }
 
@@ -42,15 +42,24 @@ pub(crate) fn quaternion([roll_deg, pitch_deg, yaw_deg]: [f64; 3]) -> [f64; 4] {
     [cr * cp * cy + sr * sp * sy, sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy]
 }
 
+/// Appends a record of a `DataFlash` log.
+pub(crate) fn put_record(out: &mut Vec<u8>, kind: u8, content: &[&[u8]]) {
+    out.extend([0xA3, 0x95, kind]);
+    for part in content {
+        out.extend_from_slice(part);
+    }
+}
+
+/// Appends the descriptions of types of records: number, name, format, columns, and length in bytes.
+pub(crate) fn describe_records(out: &mut Vec<u8>, types: &[(u8, &str, &str, &str, u8)]) {
+    for (kind, name, format, columns, length) in types {
+        put_record(out, 128, &[&[*kind, *length], &padded(name, 4), &padded(format, 16), &padded(columns, 64)]);
+    }
+}
+
 /// A `DataFlash` log: an IMU of 250 Hz and one of 125 Hz, and every tenth sample attitude, gimbal, position and fix.
 pub(crate) fn dataflash(samples: usize) -> Vec<u8> {
     let mut out = Vec::new();
-    let mut record = |kind: u8, content: &[&[u8]]| {
-        out.extend([0xA3, 0x95, kind]);
-        for part in content {
-            out.extend_from_slice(part);
-        }
-    };
     let types = [
         (10, "IMU", "QBffffff", "TimeUS,I,GyrX,GyrY,GyrZ,AccX,AccY,AccZ", 36),
         (11, "ATT", "QccC", "TimeUS,Roll,Pitch,Yaw", 17),
@@ -61,9 +70,8 @@ pub(crate) fn dataflash(samples: usize) -> Vec<u8> {
         (16, "FMTU", "QBNN", "TimeUS,FmtType,UnitIds,MultIds", 44),
         (17, "MODE", "QB", "TimeUS,Mode", 12),
     ];
-    for (kind, name, format, columns, length) in types {
-        record(128, &[&[kind, length], &padded(name, 4), &padded(format, 16), &padded(columns, 64)]);
-    }
+    describe_records(&mut out, &types);
+    let mut record = |kind: u8, content: &[&[u8]]| put_record(&mut out, kind, content);
     let start = START_US.to_le_bytes();
     record(15, &[&start, b"B", &1e-2_f64.to_le_bytes()]);
     record(16, &[&start, &[11], &padded("sddh", 16), &padded("-BBB", 16)]);

@@ -6,6 +6,7 @@ use serde::Deserialize;
 use super::mp4::Video;
 use super::recorded::{GimbalAttitude, GimbalFrame, Recorded, from_euler};
 use crate::flight_log::geodesy::Geodetic;
+use crate::geometry::median;
 
 /// Identifier of the messages.
 const UUID: [u8; 16] = [0x8d, 0x64, 0x6b, 0x4e, 0x55, 0x6f, 0x4a, 0x90, 0x8b, 0x7c, 0x35, 0xe6, 0x29, 0x51, 0x03, 0x21];
@@ -103,13 +104,11 @@ pub(super) fn read(video: &Video) -> Option<(Recorded, Option<f64>)> {
     if count == 0 {
         return None;
     }
-    let ReadMessages { mut recorded, mut fields_of_view_deg, .. } = state;
-    fields_of_view_deg.sort_by(f64::total_cmp);
-    let median_deg = fields_of_view_deg.get(fields_of_view_deg.len() / 2).copied();
-    if let (Some(narrow), Some(wide), Some(median)) =
-        (fields_of_view_deg.first(), fields_of_view_deg.last(), median_deg)
-        && wide > &(narrow * 1.01)
-    {
+    let ReadMessages { mut recorded, fields_of_view_deg, .. } = state;
+    let median_deg = median(fields_of_view_deg.iter().copied());
+    let narrow = fields_of_view_deg.iter().copied().fold(f64::INFINITY, f64::min);
+    let wide = fields_of_view_deg.iter().copied().fold(0.0, f64::max);
+    if let Some(median) = median_deg.filter(|_| wide > narrow * 1.01) {
         recorded.notes.push(format!(
             "the camera zooms: its horizontal field of view is {narrow:.1}° to {wide:.1}°, {median:.1}° in the median; a \
              rig has one camera model: convert the parts of one zoom with --start and --duration of the commands"
