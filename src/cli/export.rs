@@ -58,7 +58,7 @@ pub(crate) struct ExportArguments {
     pub limits: LimitArguments,
 }
 
-/// Values of `--to`.
+/// Program or format that `--to` names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum ProgramArgument {
     /// Camera chain and IMU.

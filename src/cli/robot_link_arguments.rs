@@ -4,7 +4,7 @@ use clap::Args;
 use dcvins::flight_log::urdf::CameraAxes;
 use dcvins::text::Named as _;
 
-/// Options beside `--urdf`.
+/// Links of a robot description that bound the chain, with the axes of the camera's link.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct RobotLinkArguments {
     /// Link of the robot description whose frame is that of the IMU.

@@ -78,7 +78,7 @@ pub(crate) enum ExperimentArgument {
     T4,
 }
 
-/// Values of `--world`.
+/// Surfaces with texture, as `--world` names them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum WorldArgument {
     /// Texture in every direction.

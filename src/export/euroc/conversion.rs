@@ -39,11 +39,11 @@ const IMU_COLUMNS: [&str; 6] = [
     "a_RS_S_z [m s^-2]",
 ];
 
-/// Conversion in progress.
+/// Conversion of one log, with the report of what is written so far.
 pub(super) struct Conversion<'a> {
     pub(super) log: &'a Arc<FlightLog>,
     pub(super) rig: &'a Rig,
-    /// The unfinished `mav0`.
+    /// `mav0` under a temporary name, until it is complete.
     pub(super) root: PathBuf,
     pub(super) done: u64,
     pub(super) total: u64,
@@ -205,7 +205,7 @@ impl Conversion<'_> {
         self.log.epoch_ns().saturating_add(stamp_ns)
     }
 
-    /// Counts one message.
+    /// Counts one message and reports the completed fraction.
     fn advance(&mut self) -> ControlFlow<()> {
         self.done += 1;
         (self.progress)((self.done as f64 / self.total as f64).min(1.0))

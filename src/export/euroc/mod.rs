@@ -24,6 +24,7 @@ use crate::sensors::{CameraMount, CameraRig, Rig};
 
 /// Folder of the sensors.
 const SENSORS: &str = "mav0";
+
 /// Checks that a log may be written as `mav0` into a folder: an existing one must be of the same log.
 ///
 /// # Errors

@@ -103,7 +103,7 @@ fn sensor_folders(root: &Path) -> Result<Vec<String>, ConvertError> {
 /// Sensors to which samples refer by number.
 struct FolderSensors {
     cameras: Vec<CameraSensor>,
-    /// Folders of poses.
+    /// Folders of ground truth, to which poses refer.
     poses: Vec<String>,
     joint_names: Vec<String>,
 }

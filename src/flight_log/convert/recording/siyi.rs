@@ -18,7 +18,7 @@ const MAX_DISTANCE_NS: i64 = 25_000_000;
 struct SiyiSubtitle {
     /// Number of the video frame.
     frame: usize,
-    /// Roll, pitch, yaw.
+    /// Roll, pitch and yaw of the gimbal.
     angles_deg: [f64; 3],
     /// Latitude and longitude in degrees, altitude in metres.
     place: Option<[f64; 3]>,

@@ -66,7 +66,7 @@ pub(super) struct Movie {
     pub(super) telemetry: Vec<Payload>,
     /// Camera motion metadata (CAMM).
     pub(super) motion: Vec<Payload>,
-    /// Subtitles (`tx3g`).
+    /// Subtitles (`tx3g`), one payload per text.
     pub(super) subtitles: Vec<Payload>,
     /// Start of the recording by the camera's clock, in nanoseconds since the epoch.
     pub(super) created_ns: Option<i64>,

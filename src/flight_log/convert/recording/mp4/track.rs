@@ -17,7 +17,7 @@ pub(super) struct Sample {
 /// Relation of a track's times to those of the movie.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct TrackClock {
-    /// Units per second.
+    /// Units of the track's times in one second.
     timescale: i128,
     /// First displayed time in these units.
     media_start: i64,
