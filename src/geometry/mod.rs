@@ -16,6 +16,7 @@ mod split_mix;
 mod tests;
 pub(crate) mod triangular_factor;
 mod vector_statistics;
+mod wahba;
 
 pub use dimension::Dimension;
 pub use rigid_transform::RigidTransform;
@@ -27,3 +28,4 @@ pub use scalars::{
 pub use signed_axes::SignedAxes;
 pub use split_mix::SplitMix64;
 pub use vector_statistics::{mean, standard_deviation};
+pub use wahba::best_rotation;

@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use super::clock_alignment::{ClockAlignment, RotationReference, align_clocks, best_rotation};
+use super::clock_alignment::{ClockAlignment, RotationReference, align_clocks};
 use super::correction::{Correction, USELESS_DELAY_S};
 use super::hypotheses::{Explanation, WithinNoise};
 use super::imu_facts::ImuFacts;
@@ -14,7 +14,7 @@ use super::rotation_fit::{FREE_ORIENTATION_RAD, FitPriors, RotationFit, Rotation
 use super::statistics::median;
 use super::survey::Survey;
 use super::{Area, Findings, ImageRotation, MeasuredFault, Measurement, Severity, hypotheses};
-use crate::geometry::so3;
+use crate::geometry::{best_rotation, so3};
 use crate::gimbal::ClassicalChain;
 use crate::sensors::{CameraMount, CameraRig, Rig};
 

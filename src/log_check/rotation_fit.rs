@@ -2,10 +2,10 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Matrix6xX, UnitQuaternion, Vector3};
 
-use super::clock_alignment::{BIAS_SIGMA_RAD_PER_S, best_rotation};
+use super::clock_alignment::BIAS_SIGMA_RAD_PER_S;
 use super::statistics::{median, percentile};
 use crate::flight_log::stream::angle_fit::FittedAngle;
-use crate::geometry::{mean_square_quantile, so3};
+use crate::geometry::{best_rotation, mean_square_quantile, so3};
 use crate::gimbal::{Chain, ClassicalChain, Parameterization};
 
 /// Quantile of the standard normal distribution beyond which a misfit is significant.

@@ -3,13 +3,12 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use super::clock_alignment::best_rotation;
 use super::imu_facts::ImuFacts;
 use super::statistics::median;
 use super::survey::Survey;
 use super::{Area, FaultySource, Findings, MeasuredFault, Severity};
 use crate::flight_log::attitude::MAX_VEHICLE_GAP_NS;
-use crate::geometry::{SIGMA_PER_MEDIAN, seconds_from_ns, so3};
+use crate::geometry::{SIGMA_PER_MEDIAN, best_rotation, seconds_from_ns, so3};
 use crate::sensors::{AttitudeFrame, Rig};
 
 /// Larger steps of the heading make joint angles useless, in radians.

@@ -16,9 +16,9 @@ mod tests;
 use nalgebra::Vector3;
 
 pub use self::references::{AlignmentReference, align_camera};
+pub(super) use self::refinement::BIAS_SIGMA_RAD_PER_S;
 pub use self::refinement::ClockAlignment;
 use self::refinement::Refined;
-pub(super) use self::refinement::{BIAS_SIGMA_RAD_PER_S, best_rotation};
 pub use self::series::RotationReference;
 use self::series::{DISTINCT_S, MIN_ROTATIONS, PairRotation};
 use super::ImageRotation;

@@ -1,11 +1,11 @@
 //! Offset, drift, rotation, scale and bias by robust least squares on rotation vectors.
 
-use nalgebra::{Matrix3, Rotation3, SMatrix, SVector, UnitQuaternion, Vector3};
+use nalgebra::{SMatrix, SVector, UnitQuaternion, Vector3};
 use serde::Serialize;
 
 use super::super::statistics::median;
 use super::series::{MIN_ROTATIONS, PairRotation, RotationReference};
-use crate::geometry::{ns_from_seconds, seconds_from_ns, so3};
+use crate::geometry::{best_rotation, ns_from_seconds, seconds_from_ns, so3};
 
 /// Prior standard deviation of the drift between two quartz clocks.
 const DRIFT_SIGMA: f64 = 1e-4;
@@ -257,20 +257,6 @@ impl Refined {
 fn constant_rotation(rows: &[Row]) -> Option<UnitQuaternion<f64>> {
     let pairs: Vec<_> = rows.iter().map(|row| (row.predicted, row.measured)).collect();
     best_rotation(&pairs).filter(|_| rows.len() >= MIN_ROTATIONS).map(|(rotation, _)| rotation)
-}
-
-/// Rotation that minimizes `Σ |measured − R·predicted|²` over pairs `(predicted, measured)` (Wahba's problem, by SVD),
-/// with the ratio of the second singular value to the first, which is near zero if all rotations are about one axis.
-pub(in crate::log_check) fn best_rotation(
-    pairs: &[(Vector3<f64>, Vector3<f64>)],
-) -> Option<(UnitQuaternion<f64>, f64)> {
-    let sum: Matrix3<f64> = pairs.iter().map(|(predicted, measured)| measured * predicted.transpose()).sum();
-    let svd = sum.svd(true, true);
-    let (u, v_t) = (svd.u?, svd.v_t?);
-    let mut handed = Matrix3::identity();
-    handed[(2, 2)] = (u * v_t).determinant().signum();
-    let rotation = Rotation3::from_matrix_unchecked(u * handed * v_t);
-    Some((UnitQuaternion::from_rotation_matrix(&rotation), svd.singular_values[1] / svd.singular_values[0].max(1e-12)))
 }
 
 /// Times of the camera on the clock of the reference: `t_reference = t_camera + offset + drift · (t_camera − middle)`.
