@@ -11,6 +11,7 @@ use crate::estimator::config::{EstimatorConfig, EstimatorOptions};
 use crate::estimator::factors::kind::{FactorKind, FactorLabel};
 use crate::estimator::report::StepReport;
 use crate::estimator::state::calibrations::MAIN;
+use crate::estimator::state::estimate::Estimate;
 use crate::estimator::state::navigation::{ImuBias, NavigationState};
 use crate::estimator::state::preintegration::Preintegration;
 use crate::geometry::{RigidTransform, so3, wrap_angle};
@@ -201,5 +202,39 @@ fn joint_offsets_stay_unobservable_without_encoders() {
         }
         let together = (residuals(&delta) - &start).amax();
         assert!(alone > 1.0 && together < 1e-6 * alone, "joint {joint}: {alone} alone, {together} together");
+    }
+}
+
+/// Chain, joint angles and attitude far from the linearization point of the prior: the derivatives of the second IMU by
+/// chain and joint angles are those of its residuals.
+#[test]
+fn derivatives_of_the_second_imu_are_those_at_the_current_estimate() {
+    let mut test = fixture::gimbal_imu_window(EstimatorOptions::default(), |_| {});
+    fixture::marginalize_once(&mut test);
+    let problem = test.problem(&[]);
+    assert!(problem.prior.is_some_and(|prior| prior.holds_frame(0)), "a prior takes part");
+    let layout = problem.layout;
+    let wanted = |label| matches!(label, FactorLabel::GimbalImu(_));
+    let moved = |at: &Estimate, delta: &DVector<f64>| problem.stepped(at, delta, &[Vec::new()]);
+    let mut columns: Vec<usize> = layout.calibration().collect();
+    (0..layout.frames).for_each(|slot| columns.extend(layout.joints(slot)));
+    let mut far = DVector::zeros(layout.total());
+    for (number, column) in columns.iter().enumerate() {
+        far[*column] = if number % 2 == 0 { 0.04 } else { -0.03 };
+    }
+    (0..layout.frames).for_each(|slot| far[layout.pose(slot).start] = 0.005);
+    let estimate = moved(&test.estimate(&[]), &far);
+    let rows = fixture::rows(&problem, &estimate, wanted);
+    let residuals = |delta: &DVector<f64>| {
+        let rows = fixture::rows(&problem, &moved(&estimate, delta), wanted);
+        rows.column(rows.ncols() - 1).into_owned()
+    };
+    for column in columns {
+        const STEP: f64 = 1e-6;
+        let mut delta = DVector::zeros(layout.total());
+        delta[column] = STEP;
+        let numeric = (residuals(&delta) - residuals(&-delta)) / (2.0 * STEP);
+        let error = (rows.column(column) - &numeric).amax();
+        assert!(error < 1e-4 * numeric.amax().max(1.0), "column {column}: {error} of {}", numeric.amax());
     }
 }

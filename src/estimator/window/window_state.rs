@@ -9,7 +9,7 @@ use crate::estimator::factors::marginal_prior::Prior;
 use crate::estimator::factors::reprojection::VisualModel;
 use crate::estimator::factors::start_prior::StartPrior;
 use crate::estimator::problem::problem::{CameraFactors, Problem};
-use crate::estimator::state::calibrations::Calibrations;
+use crate::estimator::state::calibrations::{Calibrations, MAIN};
 use crate::estimator::state::camera_view::CameraView;
 use crate::estimator::state::estimate::Estimate;
 use crate::estimator::state::frame;
@@ -52,6 +52,12 @@ impl WindowState {
                 columns: start + columns.start..start + columns.end,
             }
         };
+        // With the second IMU, derivatives are those at the current estimate: it measures the camera's rotation to a tenth of
+        // a milliradian, and chain, joint angles and attitude of the vehicle compensate each other in it, so that first
+        // estimates of some with current values of the others belong to a pose in error by up to degrees. Only the classical
+        // parameterization has redundant directions, which need first estimates.
+        let redundant = self.calibration.of(MAIN).chain().parameterization() == Parameterization::Classical;
+        let first_estimates = setup.config.gimbal_imu.is_none() || redundant;
         Problem {
             layout,
             cameras: (0..self.calibration.cameras()).map(factors).collect(),
@@ -60,8 +66,8 @@ impl WindowState {
             frames: &self.frames,
             prior: self.prior.as_ref(),
             start: self.start.as_ref(),
-            first_estimate_reach_rad: options.first_estimate_reach_rad,
-            calibration_first_estimates: options.calibration_first_estimates,
+            first_estimate_reach_rad: if first_estimates { options.first_estimate_reach_rad } else { 0.0 },
+            calibration_first_estimates: options.calibration_first_estimates && first_estimates,
         }
     }
 
