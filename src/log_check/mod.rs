@@ -240,6 +240,9 @@ fn check_topics(log: &FlightLog, rig: &Rig, findings: &mut Findings) {
     }
     if let Some(imu) = &rig.gimbal_imu {
         require("imu1.rostopic".into(), &imu.sensor.topic, &[MessageKind::Imu], Severity::Error);
+        if let Some(topic) = &imu.sensor.accelerometer_topic {
+            require("imu1.accelerometer_rostopic".into(), topic, &[MessageKind::Imu], Severity::Error);
+        }
     }
     for camera in &rig.cameras {
         require(format!("{}.rostopic", camera.key), &camera.topic, &MessageKind::IMAGES, Severity::Error);
@@ -275,6 +278,9 @@ fn role_of(topic: &str, kind: Option<MessageKind>, rig: Option<&Rig>) -> String 
         }
         if rig.gimbal_imu.as_ref().is_some_and(|imu| imu.sensor.topic == topic) {
             return "imu1".into();
+        }
+        if rig.gimbal_imu.as_ref().is_some_and(|imu| imu.sensor.accelerometer_topic.as_deref() == Some(topic)) {
+            return "imu1 accelerometer".into();
         }
         if let Some(camera) = rig.cameras.iter().find(|camera| camera.topic == topic) {
             return camera.key.clone();

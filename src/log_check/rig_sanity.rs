@@ -56,10 +56,13 @@ fn check_assumed(rig: &Rig, findings: &mut Findings) {
 fn how_to_measure(field: &str) -> (Area, &'static str) {
     let (part, name) = field.split_once('.').unwrap_or((field, ""));
     match (part, name) {
-        ("imu0", "rostopic" | "accelerometer_rostopic") | ("gimbal", "rostopic") => {
+        ("imu0" | "imu1", "rostopic" | "accelerometer_rostopic") | ("gimbal", "rostopic") => {
             (Area::Log, "name the topic of the log")
         }
-        ("imu0", _) => {
+        ("imu1", "T_cam_imu") => {
+            (Area::Extrinsics, "correct it by what check measures of its axes, or run with gimbal-imu-axes=on")
+        }
+        ("imu0" | "imu1", _) => {
             (Area::Imu, "record the stationary IMU for some minutes, or take twice the value that check measures")
         }
         ("gravity", _) => (Area::Imu, "set gravity for the place of the flight"),

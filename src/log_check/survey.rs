@@ -20,7 +20,7 @@ use crate::flight_log::message_content::frame_and_checksum;
 use crate::flight_log::stream::angle_fit::{self, FittedAngle};
 use crate::flight_log::{FlightLog, messages, messages::MessageKind};
 use crate::geometry::{ns_from_seconds, seconds_from_ns, wrap_angle};
-use crate::sensors::{AttitudeSource, GimbalRig, ImuSample, JointSample, Rig};
+use crate::sensors::{AttitudeSource, GimbalRig, ImuRig, ImuSample, JointSample, Rig};
 
 /// Maximum number of listed joint names; messages may name more.
 const JOINT_NAMES: usize = 64;
@@ -61,6 +61,8 @@ pub(super) struct Survey {
     /// Samples of the IMU on the gimbal in the order of their stamps, without those that are no measurement; empty
     /// without one.
     pub(super) gimbal_imu: Vec<ImuSample>,
+    /// Stamps and specific forces of its separate accelerometer.
+    gimbal_accelerometer: Vec<(i64, Vector3<f64>)>,
     /// Messages of the IMU that are no measurement.
     pub(super) unmeasured: UnmeasuredStamps,
     /// Messages of the encoders in the order of log times.
@@ -145,7 +147,12 @@ impl Survey {
         if let Some(gimbal) = rig.and_then(|rig| rig.gimbal.as_ref()) {
             survey.set_joints(gimbal);
         }
-        survey.gimbal_imu = measured(std::mem::take(&mut survey.gimbal_imu), &mut UnmeasuredStamps::default());
+        let dropped = &mut UnmeasuredStamps::default();
+        survey.gimbal_imu = if survey.gimbal_accelerometer.is_empty() {
+            measured(std::mem::take(&mut survey.gimbal_imu), dropped)
+        } else {
+            measured_apart(&survey.gimbal_imu, &mut survey.gimbal_accelerometer, dropped)
+        };
         survey.imu = if survey.accelerometer.is_empty() {
             measured(std::mem::take(&mut survey.imu), &mut survey.unmeasured)
         } else {
@@ -261,14 +268,10 @@ impl Survey {
             }
         }
         let Some(rig) = rig else { return };
-        if let Some(imu) = rig.gimbal_imu.as_ref().filter(|imu| imu.sensor.topic == topic) {
-            match messages::read_imu(data) {
-                Ok(message) => self.gimbal_imu.push(imu.sensor.intrinsics.correct(&ImuSample {
-                    stamp_ns,
-                    angular_velocity_rad_per_s: message.angular_velocity_rad_per_s,
-                    specific_force_m_per_s2: message.specific_force_m_per_s2,
-                })),
-                Err(error) => entry.refuse(error.to_string()),
+        if let Some(imu) = rig.gimbal_imu.as_ref().filter(|imu| imu.sensor.reads(topic)) {
+            let taken = (&mut self.gimbal_imu, &mut self.gimbal_accelerometer);
+            if let Err(problem) = take_gimbal_imu(taken, &imu.sensor, topic, stamp_ns, data) {
+                entry.refuse(problem);
             }
         }
         if rig.imu.accelerometer_topic.as_deref() == Some(topic) {
@@ -323,6 +326,25 @@ impl Survey {
             }
         }
     }
+}
+
+/// Adds a message of the IMU on the gimbal to its samples, or to the specific forces of a separate accelerometer.
+fn take_gimbal_imu(
+    (samples, forces): (&mut Vec<ImuSample>, &mut Vec<(i64, Vector3<f64>)>),
+    sensor: &ImuRig,
+    topic: &str,
+    stamp_ns: i64,
+    data: &[u8],
+) -> Result<(), String> {
+    let message = messages::read_imu(data).map_err(|error| error.to_string())?;
+    let (rate, force) = (message.angular_velocity_rad_per_s, message.specific_force_m_per_s2);
+    if sensor.topic == topic {
+        let measured = ImuSample { stamp_ns, angular_velocity_rad_per_s: rate, specific_force_m_per_s2: force };
+        samples.push(sensor.intrinsics.correct(&measured));
+    } else {
+        forces.push((stamp_ns, sensor.intrinsics.correct_specific_force(&force)));
+    }
+    Ok(())
 }
 
 /// True for a reading that can be an angle in radians, with whole turns.

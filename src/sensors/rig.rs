@@ -39,6 +39,13 @@ pub struct ImuRig {
     pub intrinsics: ImuIntrinsics,
 }
 
+impl ImuRig {
+    /// True for the topic of its angular velocities and for that of its specific forces.
+    pub fn reads(&self, topic: &str) -> bool {
+        self.topic == topic || self.accelerometer_topic.as_deref() == Some(topic)
+    }
+}
+
 /// IMU on the gimbal, rigidly attached to the camera there.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GimbalImuRig {
@@ -231,11 +238,11 @@ impl Rig {
 
     /// True if the log times of a topic replace its header stamps.
     pub fn uses_log_time(&self, topic: &str) -> bool {
-        let of_imu = self.imu.topic == topic || self.imu.accelerometer_topic.as_deref() == Some(topic);
-        let second = |second: &GimbalImuRig| second.sensor.use_log_time && second.sensor.topic == topic;
+        let imu = |imu: &ImuRig| imu.use_log_time && imu.reads(topic);
+        let second = |second: &GimbalImuRig| imu(&second.sensor);
         let camera = |camera: &CameraRig| camera.use_log_time && camera.topic == topic;
         let gimbal = |gimbal: &GimbalRig| gimbal.use_log_time && gimbal.topic.as_deref() == Some(topic);
-        (self.imu.use_log_time && of_imu)
+        imu(&self.imu)
             || self.gimbal_imu.as_ref().is_some_and(second)
             || self.cameras.iter().any(camera)
             || self.gimbal.as_ref().is_some_and(gimbal)

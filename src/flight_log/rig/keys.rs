@@ -43,6 +43,7 @@ const GIMBAL_IMU: Keys = Keys {
     read: &[
         "mount",
         "rostopic",
+        "accelerometer_rostopic",
         "use_log_time",
         "frame_id",
         "update_rate",

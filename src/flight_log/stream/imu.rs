@@ -57,7 +57,7 @@ impl ImuStream {
             let samples = Measured::new(log, &rig.topic, from_ns, decoder);
             return Ok(Self { source: ImuSource::Together(Box::new(samples)), intrinsics: rig.intrinsics });
         };
-        log.require_topic("imu0.accelerometer_rostopic", accelerometer, &[MessageKind::Imu])?;
+        log.require_topic(&format!("{key}.accelerometer_rostopic"), accelerometer, &[MessageKind::Imu])?;
         let epoch_ns = log.epoch_ns();
         let mut rate = vector_decoder("angular velocity", |imu| imu.angular_velocity_rad_per_s, clock, None);
         let stamped: Decoder<(i64, Vector3<f64>)> =

@@ -25,6 +25,12 @@ const GROUND_TRUTH_WORDS: [&str; 6] = ["truth", "vicon", "optitrack", "mocap", "
 /// Rates of templates without a log, in Hz.
 const IMU_RATE_HZ: f64 = 200.0;
 const IMAGE_RATE_HZ: f64 = 30.0;
+/// Topics of the IMU of an autopilot and of a camera in converted recordings, alone or the first of several.
+const VEHICLE_IMUS: [&str; 2] = ["/imu", "/imu0"];
+const CAMERA_IMUS: [&str; 2] = ["/camera/imu", "/camera/imu0"];
+/// Endings of the topics of an IMU whose sensors have separate ones.
+const GYROSCOPE: &str = "/gyroscope";
+const ACCELEROMETER: &str = "/accelerometer";
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct RigChoices {
@@ -41,9 +47,11 @@ pub struct RigChoices {
     pub imu_axes: Option<BodyAxes>,
     /// Position of the gimbal: forward, left and up of the IMU, in metres; `None` if it has not been measured.
     pub position_m: Option<Vector3<f64>>,
-    /// Topic of the IMU, `None` for the log's only one.
+    /// Topic of the IMU, or of its gyroscope; `None` for the log's only one, and for the autopilot's of a recording that
+    /// also has the camera's.
     pub imu_topic: Option<String>,
-    /// Topic of an IMU in the camera's housing on a gimbal, `None` without one.
+    /// Topic of an IMU in the camera's housing on a gimbal, or of its gyroscope; `None` for that of a converted recording,
+    /// or without one.
     pub gimbal_imu_topic: Option<String>,
     /// Its axes in the camera, forward being the viewing direction; `None` if unknown.
     pub gimbal_imu_axes: Option<BodyAxes>,
@@ -86,10 +94,11 @@ impl RigTemplate {
             || Sourced::assumed(Vector3::zeros(), nothing_known),
             |position_m| Sourced::assumed(position_m, "position measured by hand"),
         );
-        let gimbal_imu = choices.gimbal_imu_topic.as_ref().filter(|_| !is_rigid);
+        let of_camera = || log.and_then(camera_imu).filter(|topic| choices.imu_topic.as_ref() != Some(topic));
+        let gimbal_imu = choices.gimbal_imu_topic.clone().or_else(of_camera).filter(|_| !is_rigid);
         Ok(Self {
             name: choices.name.clone(),
-            gimbal_imu: gimbal_imu.map(|topic| gimbal_imu_of(topic, choices, log)).transpose()?,
+            gimbal_imu: gimbal_imu.map(|topic| gimbal_imu_of(&topic, choices, log)).transpose()?,
             imu,
             camera,
             described: choices.described.clone(),
@@ -156,17 +165,23 @@ fn imu(choices: &RigChoices, log: Option<&FlightLog>) -> Result<ImuTemplate, Tem
         });
     };
     let topics = topics_of(log, &[MessageKind::Imu]);
-    // RealSense: angular velocities and specific forces on separate topics.
+    // RealSense and GoPro: angular velocities and specific forces on separate topics.
     let named = |word: &str| topics.iter().find(|info| info.topic.to_ascii_lowercase().contains(word));
-    let apart = match (choices.imu_topic.as_ref(), named("gyro"), named("accel")) {
+    let exactly = |name: &str| topics.iter().find(|info| info.topic == name).copied();
+    let vehicle = camera_imu(log).and_then(|_| VEHICLE_IMUS.into_iter().find_map(exactly)).map(|info| &info.topic);
+    let chosen = choices.imu_topic.as_ref().or(vehicle);
+    let apart = match (chosen, named("gyro"), named("accel")) {
         (None, Some(gyroscope), Some(accelerometer)) if topics.len() == 2 => Some((*gyroscope, *accelerometer)),
+        (Some(chosen), ..) => chosen
+            .strip_suffix(GYROSCOPE)
+            .and_then(|prefix| Some((exactly(chosen)?, exactly(&format!("{prefix}{ACCELEROMETER}"))?))),
         _ => None,
     };
     let (info, accelerometer) = if let Some((gyroscope, accelerometer)) = apart {
         (gyroscope, Some(accelerometer))
     } else {
         let what = ("IMU topics", "--imu-topic");
-        let info = one_topic(log, &[MessageKind::Imu], choices.imu_topic.as_ref(), "/imu/data", what)?;
+        let info = one_topic(log, &[MessageKind::Imu], chosen, "/imu/data", what)?;
         let missing = || TemplateError::NoTopic {
             what: "IMU topic".to_owned(),
             remedy: "record sensor_msgs/msg/Imu, or convert the autopilot's log".to_owned(),
@@ -181,6 +196,14 @@ fn imu(choices: &RigChoices, log: Option<&FlightLog>) -> Result<ImuTemplate, Tem
         axes: imu_axes(choices, force),
         noise,
     })
+}
+
+/// Topic of an IMU in the camera of a converted recording that also has the IMU of an autopilot; `None` for other logs.
+fn camera_imu(log: &FlightLog) -> Option<String> {
+    let topics = topics_of(log, &[MessageKind::Imu]);
+    let has = |name: &str| topics.iter().any(|info| info.topic == name);
+    let names = CAMERA_IMUS.into_iter().flat_map(|name| [name.to_owned(), format!("{name}{GYROSCOPE}")]);
+    names.into_iter().find(|name| has(name)).filter(|_| VEHICLE_IMUS.into_iter().any(has))
 }
 
 /// IMU in the camera's housing on this topic.
