@@ -176,8 +176,9 @@ fn convert_to_log(arguments: &ConvertArguments) -> Result<ExitOutcome> {
         Ok(mut report) => {
             if let Some(aligned) = &aligned {
                 let plot = arguments.output.with_extension("alignment.svg");
-                export::write_alignment_plot(aligned, &plot)?;
-                report.notes.insert(0, format!("{aligned}: {}", plot.display()));
+                let drawn = export::write_alignment_plot(aligned, &plot)?;
+                let drawing = if drawn { format!(": {}", plot.display()) } else { String::new() };
+                report.notes.insert(0, format!("{aligned}{drawing}"));
             }
             print_report(&report, arguments.json).map(|()| ExitOutcome::Success)
         }

@@ -61,4 +61,4 @@ pub use stills_files::write_stills;
 pub use stills_report::StillsReport;
 #[cfg(feature = "gui")]
 pub use study_screenshot::{draw_study_panel, draw_study_panel_svg, study_panel_csv};
-pub use video_alignment::{VideoAlignment, VideoAlignmentError, align_video, write_alignment_plot};
+pub use video_alignment::{AlignmentEvidence, VideoAlignment, VideoAlignmentError, align_video, write_alignment_plot};

@@ -1,4 +1,4 @@
-//! Time alignment of a video with an autopilot's log, by the rotations that both recorded.
+//! Time alignment of a video with an autopilot's log, by the rotations or the specific forces that both recorded.
 
 mod plot;
 
@@ -11,12 +11,12 @@ use std::sync::Arc;
 use thiserror::Error;
 
 pub use self::plot::write_alignment_plot;
-use crate::flight_log::convert::{ConvertError, ConvertOptions, VideoClock, convert_with};
+use crate::flight_log::convert::{ConvertError, ConvertOptions, ForceAgreement, VideoClock, convert_with};
 use crate::flight_log::output::folder_of;
 use crate::flight_log::{FlightLog, LogError};
 use crate::geometry::seconds_from_ns;
 use crate::log_check::{AlignmentError, AlignmentReference, ClockAlignment, align_camera};
-use crate::sensors::Rig;
+use crate::sensors::{CameraMount, Rig};
 use crate::session::camera_rotations;
 
 /// Search range in seconds on either side of the first guess.
@@ -30,12 +30,18 @@ const CONVERTED: f64 = 0.5;
 /// Alignment of a video's clock with that of an autopilot's log, with its evidence.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VideoAlignment {
-    /// Reference with which the images were compared.
-    pub reference: AlignmentReference,
     /// Clock of the video relative to the log.
     pub clock: VideoClock,
-    /// Alignment relative to the first guess.
-    pub alignment: ClockAlignment,
+    pub evidence: AlignmentEvidence,
+}
+
+/// Measurements that agree at the offset found.
+#[derive(Clone, Debug, PartialEq)]
+pub enum AlignmentEvidence {
+    /// Rotations of the images and of a reference; the alignment is relative to the first guess.
+    Rotations { reference: AlignmentReference, alignment: Box<ClockAlignment> },
+    /// Specific forces of both IMUs.
+    Forces(ForceAgreement),
 }
 
 /// Reason why a video could not be aligned.
@@ -64,19 +70,33 @@ pub enum VideoAlignmentError {
 
 impl fmt::Display for VideoAlignment {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let found = &self.alignment;
+        let clock = self.clock;
+        let (reference, found) = match &self.evidence {
+            AlignmentEvidence::Rotations { reference, alignment } => (reference, alignment),
+            AlignmentEvidence::Forces(found) => {
+                return write!(
+                    out,
+                    "the video starts {:+.3} s after the first measurement of the autopilot's log (σ {:.1} ms), drift {:+.0} ppm: \
+                     the specific forces of both IMUs have a correlation of {:.2}",
+                    clock.offset_s,
+                    1e3 * found.offset_sigma_s,
+                    clock.drift_ppm,
+                    found.correlation,
+                );
+            }
+        };
         write!(
             out,
             "the video starts {:+.3} s after the first measurement of the autopilot's log (σ {:.1} ms), drift {:+.0} ± {:.0} ppm: \
              {:.0} % of {} rotations of the images, {:.2}° each, are explained by {}, with residuals of {:.2}°",
-            self.clock.offset_s,
+            clock.offset_s,
             1e3 * found.offset_sigma_s,
             found.drift_ppm,
             found.drift_sigma_ppm,
             100.0 * found.explained,
             found.rotations,
             found.rotation_deg,
-            self.reference,
+            reference,
             found.residual_deg,
         )?;
         if let Some((offset_s, explained)) = found.next {
@@ -94,7 +114,8 @@ impl fmt::Display for VideoAlignment {
 }
 
 /// Estimates the time offset of a video in the autopilot's log of `options` within ±60 s of the first guess, which is
-/// that of the conversion. The camera model is that of `rig`, else the one that the conversion assumes. Temporary files lie
+/// that of the conversion: by the rotations of the images, or by the specific forces of both IMUs where the images do not
+/// agree with the autopilot's gyroscope, as on a gimbal without recorded angles. The camera model is that of `rig`, else the one that the conversion assumes. Temporary files lie
 /// in the folder of `output`.
 ///
 /// # Errors
@@ -114,17 +135,32 @@ pub fn align_video(
     let guess = report.video_clock.unwrap_or_default();
     let log = Arc::new(FlightLog::open_with(&path, &options.limits)?);
     let rig = Rig::for_log(&log, rig)?;
+    let by_forces =
+        report.forces.map(|found| VideoAlignment { clock: guess, evidence: AlignmentEvidence::Forces(found) });
+    // Without angles of its joints, the images of a camera on a gimbal cannot be compared with the autopilot's gyroscope.
+    let on_gimbal = rig.cameras.first().is_some_and(|camera| camera.mount == CameraMount::Gimbal);
+    if on_gimbal
+        && rig.gimbal.as_ref().is_none_or(|gimbal| gimbal.topic.is_none())
+        && let Some(found) = by_forces
+    {
+        return Ok(found);
+    }
     let camera_key = rig.cameras.first().map(|camera| camera.key.clone()).unwrap_or_default();
     let rotations = camera_rotations(&log, &rig, &camera_key, SECTIONS, SECTION_S)?;
     let aligned = align_camera(&log, &rig, &camera_key, &rotations, SEARCH_S);
-    let (reference, alignment) = aligned.map_err(|problem| VideoAlignmentError::NotAligned {
-        source: problem,
-        guess_s: guess.offset_s,
-        path: source.to_owned(),
-    })?;
-    // The guess has no drift, and the log of the first guess starts at its first measurement or with the video.
+    let (reference, alignment) = match (aligned, by_forces) {
+        (Ok(found), _) => found,
+        (Err(_), Some(found)) => return Ok(found),
+        (Err(problem), None) => {
+            let (guess_s, path) = (guess.offset_s, source.to_owned());
+            return Err(VideoAlignmentError::NotAligned { source: problem, guess_s, path });
+        }
+    };
+    // The log of the first guess starts at its first measurement or with the video.
     let log_start_s = if guess.offset_s < 0.0 { -guess.offset_s } else { 0.0 };
     let shift_s = seconds_from_ns(alignment.shift_ns(crate::geometry::ns_from_seconds(log_start_s + guess.offset_s)));
-    let clock = VideoClock { offset_s: guess.offset_s + shift_s, drift_ppm: alignment.drift_ppm };
-    Ok(VideoAlignment { reference, clock, alignment })
+    let drift_ppm = guess.drift_ppm + alignment.drift_ppm;
+    let clock = VideoClock { offset_s: guess.offset_s + shift_s, drift_ppm };
+    let evidence = AlignmentEvidence::Rotations { reference, alignment: Box::new(alignment) };
+    Ok(VideoAlignment { clock, evidence })
 }

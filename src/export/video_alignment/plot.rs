@@ -5,9 +5,10 @@ use std::path::Path;
 
 use maud::{Markup, html};
 
-use super::VideoAlignment;
+use super::{AlignmentEvidence, VideoAlignment};
 use crate::export::ExportError;
 use crate::flight_log::output::write_file;
+use crate::log_check::ClockAlignment;
 
 /// Size of the drawing, and margins of both plots in it.
 const WIDTH: f64 = 960.0;
@@ -77,8 +78,7 @@ impl Plot {
     }
 }
 
-fn drawing(aligned: &VideoAlignment) -> String {
-    let found = &aligned.alignment;
+fn drawing(aligned: &VideoAlignment, reference: &str, found: &ClockAlignment) -> String {
     let offsets = found.correlation.iter().map(|(offset_s, _)| *offset_s);
     let range = |values: &mut dyn Iterator<Item = f64>| {
         let (low, high) =
@@ -107,16 +107,15 @@ fn drawing(aligned: &VideoAlignment) -> String {
             (times.line(speeds.iter().map(|(time_s, _, reference)| (*time_s, *reference)), 0.5 * step as f64, REFERENCE))
             (times.line(speeds.iter().map(|(time_s, images, _)| (*time_s, *images)), 0.5 * step as f64, IMAGES))
             text x=(RIGHT) y="310" text-anchor="end" {
-                tspan fill=(IMAGES) { "images" } "   " tspan fill=(REFERENCE) { (aligned.reference.to_string()) }
+                tspan fill=(IMAGES) { "images" } "   " tspan fill=(REFERENCE) { (reference) }
             }
-            text x=(LEFT) y=(HEIGHT - 8.0) font-size="11" { (summary(aligned)) }
+            text x=(LEFT) y=(HEIGHT - 8.0) font-size="11" { (summary(aligned, found)) }
         }
     };
     format!("{}\n", markup.into_string())
 }
 
-fn summary(aligned: &VideoAlignment) -> String {
-    let found = &aligned.alignment;
+fn summary(aligned: &VideoAlignment, found: &ClockAlignment) -> String {
     format!(
         "offset {:+.4} s (σ {:.1} ms), drift {:+.0} ± {:.0} ppm, {:.0} % of the rotation explained",
         aligned.clock.offset_s,
@@ -127,10 +126,13 @@ fn summary(aligned: &VideoAlignment) -> String {
     )
 }
 
-/// Draws the search and the angular rates at the estimated offset, as SVG.
+/// Draws the search and the angular rates at the estimated offset, as SVG; false for an alignment by specific forces, which
+/// has no drawing.
 ///
 /// # Errors
 /// If the file cannot be written.
-pub fn write_alignment_plot(aligned: &VideoAlignment, path: &Path) -> Result<(), ExportError> {
-    write_file(path, drawing(aligned).as_bytes()).map_err(ExportError::write(path))
+pub fn write_alignment_plot(aligned: &VideoAlignment, path: &Path) -> Result<bool, ExportError> {
+    let AlignmentEvidence::Rotations { reference, alignment } = &aligned.evidence else { return Ok(false) };
+    let text = drawing(aligned, &reference.to_string(), alignment);
+    write_file(path, text.as_bytes()).map_err(ExportError::write(path)).map(|()| true)
 }

@@ -29,7 +29,7 @@ use std::path::{Path, PathBuf};
 
 pub use error::ConvertError;
 pub use euroc_rig::{EUROC_GIMBAL, EUROC_GROUND_TRUTH, EUROC_RIG, rig_of_euroc_folder};
-pub use options::{AutopilotLog, AutopilotLogKind, ConvertOptions, VideoClock};
+pub use options::{AutopilotLog, AutopilotLogKind, ConvertOptions, ForceAgreement, VideoClock};
 pub use report::{ConversionReport, ConvertedTopic};
 pub use source_kind::{SourceKind, source_kind};
 

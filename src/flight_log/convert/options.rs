@@ -47,6 +47,16 @@ pub struct AutopilotLog {
     pub path: PathBuf,
 }
 
+/// Agreement of the specific forces of an autopilot and of a camera, whose magnitudes do not depend on a gimbal between
+/// them, at the offset of their clocks at which it is best.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ForceAgreement {
+    /// Correlation coefficient of the magnitudes.
+    pub correlation: f64,
+    /// Standard deviation of the offset.
+    pub offset_sigma_s: f64,
+}
+
 /// Offset and drift of a video's clock relative to the clock of an autopilot's log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct VideoClock {

@@ -3,7 +3,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Serialize, Serializer};
 
-use super::VideoClock;
+use super::{ForceAgreement, VideoClock};
 use crate::flight_log::text::{printable, shortened};
 
 /// Result of one topic of a source.
@@ -36,6 +36,9 @@ pub struct ConversionReport {
     pub duration_s: f64,
     /// Relation of the video's clock to the autopilot's log; `None` without both.
     pub video_clock: Option<VideoClock>,
+    /// Evidence for this clock if it was found by the specific forces of autopilot and camera.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub forces: Option<ForceAgreement>,
     /// All topics of the source, in the order of their names.
     pub topics: Vec<ConvertedTopic>,
     /// Remarks, such as damage or a missing rig.

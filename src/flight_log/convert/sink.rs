@@ -13,7 +13,7 @@ use super::super::writer::MessageType;
 use super::super::{LogWriter, MessageKind, MessageTimes};
 use super::ros1_message::cdr_from_ros1;
 use super::taken_records::TakenRecords;
-use super::{ConversionReport, ConvertError, ConvertedTopic, VideoClock};
+use super::{ConversionReport, ConvertError, ConvertedTopic, ForceAgreement, VideoClock};
 
 /// Number of characters shown of a too long name.
 const SHOWN_CHARS: usize = 48;
@@ -64,6 +64,8 @@ pub(super) struct LogSink<'a> {
     limits: LogLimits,
     /// Relation of the video's clock to the autopilot's log.
     pub(super) video_clock: Option<VideoClock>,
+    /// Evidence for it, if it was found by specific forces.
+    pub(super) forces: Option<ForceAgreement>,
     /// Records of the source that can be chosen.
     pub(super) records: TakenRecords,
     /// Number of messages in the log.
@@ -94,6 +96,7 @@ impl<'a> LogSink<'a> {
             notes,
             limits,
             video_clock: None,
+            forces: None,
             records,
             count: 0,
             progress,
@@ -333,6 +336,7 @@ impl<'a> LogSink<'a> {
             rig: None,
             duration_s: 0.0,
             video_clock: self.video_clock,
+            forces: self.forces,
             topics,
             notes: self.notes,
         })

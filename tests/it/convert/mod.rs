@@ -1,6 +1,7 @@
 //! `convert`: generated bags, databases and folders, compared with the log that the same values give when written
 //! directly.
 
+mod action_camera;
 mod damage;
 mod euroc;
 mod gimbal_recorders;

@@ -16,6 +16,7 @@ mod siyi;
 mod telemetry;
 mod tlog;
 mod topics;
+mod two_imus;
 mod ulog;
 
 use std::fs::File;
@@ -110,10 +111,12 @@ pub(super) fn convert_video(
     let recorders = [Some(&camera), drone.as_ref(), gimbal.as_ref()];
     let video_utc_ns = recorders.into_iter().flatten().find_map(Recorded::utc_offset_ns);
     let mut topics = Topics::default();
+    let mut camera_moves = false;
     let place = if let Some(log) = &options.autopilot {
         let mut recorded = read_autopilot(log, sink)?;
         to_utc(&mut recorded);
-        let place = place_video(&recorded, video.span_ns(), video_utc_ns.or(created_ns), options.video_clock, sink);
+        let video_times = VideoTimes { span_ns: video.span_ns(), utc_ns: video_utc_ns.or(created_ns) };
+        let place = place_video(&recorded, &camera, video_times, options.video_clock, sink);
         if let Some(drone) = drone {
             let count = drone.count();
             sink.leave("Karma", "GoPro Karma", count, "the autopilot's log is read instead");
@@ -121,6 +124,17 @@ pub(super) fn convert_video(
         if let Some(mut gimbal) = gimbal {
             gimbal.map_times(|time_ns| place.time_ns(time_ns));
             recorded.append(gimbal);
+        }
+        camera.map_times(|time_ns| place.time_ns(time_ns));
+        if !place.is_guess && recorded.gimbal.count() == 0 {
+            let both = two_imus::first_imu(&recorded).zip(two_imus::first_imu(&camera));
+            camera_moves = both.and_then(|(vehicle, own)| two_imus::camera_moves(vehicle, own)) == Some(true);
+        }
+        if camera_moves {
+            sink.note(
+                "the IMUs of camera and autopilot rotate differently and no attitude of a gimbal is recorded: the rig has a \
+                 gimbal without joint angles, and the camera's IMU as imu1",
+            );
         }
         topics.add_recorded(recorded, sink);
         place
@@ -140,9 +154,10 @@ pub(super) fn convert_video(
             vehicle.shift(start_ns);
             topics.add_recorded(vehicle, sink);
         }
-        Place { start_ns, rate: 1.0 }
+        let place = Place { start_ns, rate: 1.0, is_guess: false };
+        camera.map_times(|time_ns| place.time_ns(time_ns));
+        place
     };
-    camera.map_times(|time_ns| place.time_ns(time_ns));
     topics.add_recorded(camera, sink);
     topics.add_video(&video, |time_ns| place.time_ns(time_ns));
     let facts = VideoFacts {
@@ -152,6 +167,7 @@ pub(super) fn convert_video(
         horizontal_deg,
         has_unknown_axes,
         gimbal_frame: topics.gimbal_frame,
+        camera_moves,
         has_autopilot: options.autopilot.is_some(),
     };
     topics.write(source, Some(&video), sink)?;
@@ -165,6 +181,8 @@ struct Place {
     start_ns: i64,
     /// Log seconds per video second.
     rate: f64,
+    /// True for a time that camera or autopilot have recorded, accurate to seconds at best.
+    is_guess: bool,
 }
 
 impl Place {
@@ -174,11 +192,21 @@ impl Place {
     }
 }
 
-/// Relates a video to an autopilot's log: by the given clock, else by UTC if both have it, else both start together.
+/// Times of a video on its own clock.
+#[derive(Clone, Copy, Debug)]
+struct VideoTimes {
+    /// First and last presented time.
+    span_ns: (i64, i64),
+    /// UTC at the start, `None` if the camera recorded none.
+    utc_ns: Option<i64>,
+}
+
+/// Relates a video to an autopilot's log: by the given clock, else by the specific forces of both IMUs, else by UTC if
+/// both have it, else both start together.
 fn place_video(
     recorded: &Recorded,
-    (first_ns, last_ns): (i64, i64),
-    video_utc_ns: Option<i64>,
+    camera: &Recorded,
+    VideoTimes { span_ns: (first_ns, last_ns), utc_ns: video_utc_ns }: VideoTimes,
     clock: Option<VideoClock>,
     sink: &mut LogSink<'_>,
 ) -> Place {
@@ -186,7 +214,7 @@ fn place_video(
     if let Some(clock) = clock {
         let start_ns = log_start_ns.saturating_add(ns_from_seconds(clock.offset_s));
         sink.video_clock = Some(clock);
-        return Place { start_ns, rate: 1.0 + clock.drift_ppm * 1e-6 };
+        return Place { start_ns, rate: 1.0 + clock.drift_ppm * 1e-6, is_guess: false };
     }
     let has_utc = !recorded.utc.is_empty();
     let overlaps = |start_ns: i64| {
@@ -205,11 +233,18 @@ fn place_video(
         }
         _ => (log_start_ns.saturating_sub(first_ns), "starts aligned: camera or autopilot recorded no time"),
     };
+    let both = two_imus::first_imu(recorded).zip(two_imus::first_imu(camera));
+    if let Some(found) = both.and_then(|(vehicle, own)| two_imus::clock_by_forces(vehicle, own, start_ns)) {
+        let offset_s = seconds_from_ns(found.start_ns.saturating_sub(log_start_ns));
+        sink.video_clock = Some(VideoClock { offset_s, drift_ppm: 1e6 * found.drift });
+        sink.forces = Some(found.agreement);
+        return Place { start_ns: found.start_ns, rate: 1.0 + found.drift, is_guess: false };
+    }
     let offset_s = seconds_from_ns(start_ns.saturating_sub(log_start_ns));
     sink.video_clock = Some(VideoClock { offset_s, drift_ppm: 0.0 });
     sink.note(format!(
         "the video is placed {offset_s:.3} s after the first measurement of the autopilot's log ({reason}), accurate to \
          seconds at best; give a better offset with --video-offset"
     ));
-    Place { start_ns, rate: 1.0 }
+    Place { start_ns, rate: 1.0, is_guess: true }
 }

@@ -10,9 +10,6 @@ use crate::sensors::BodyAxes;
 const USUAL_FIELD_OF_VIEW_DEG: f64 = 84.0;
 /// Mechanism of an unknown gimbal: the usual order of three axes.
 const USUAL_MECHANISM: &str = "yaw-roll-pitch";
-/// Topics of the IMU in a video's telemetry, alone or the first of several.
-const CAMERA_IMU: &str = "/camera/imu";
-const CAMERA_IMU_0: &str = "/camera/imu0";
 /// `GoPro` cameras by the first letters of their firmware.
 const FIRMWARES: [(&str, &str); 8] = [
     ("HD3", "hero3"),
@@ -38,6 +35,8 @@ pub(in super::super) struct VideoFacts {
     pub(super) has_unknown_axes: bool,
     /// Frame of the gimbal's attitude, `None` if it was not recorded.
     pub(super) gimbal_frame: Option<GimbalFrame>,
+    /// True if the camera rotates relative to the autopilot, by the IMUs of both.
+    pub(super) camera_moves: bool,
     /// True for the IMU of an autopilot.
     pub(super) has_autopilot: bool,
 }
@@ -65,8 +64,6 @@ impl VideoFacts {
         let both = |suffix: &str| [format!("{prefix}{suffix}"), format!("{prefix}0{suffix}")];
         let present = |names: [String; 2]| names.into_iter().find(|name| log.topic(name).is_some());
         let imu = present(both("")).or_else(|| present(both("/gyroscope")));
-        let accelerometer = imu.as_ref().and_then(|imu| imu.strip_suffix("/gyroscope"));
-        let accelerometer = accelerometer.map(|imu| format!("{imu}/accelerometer"));
         let frame = self.gimbal_frame.filter(|_| log.topic(VEHICLE_TOPIC).is_some());
         let attitude = frame.map(|frame| {
             let frame = match frame {
@@ -84,7 +81,8 @@ impl VideoFacts {
             (GIMBAL_TOPIC.to_owned(), entries.to_vec())
         });
         let (frd, flu) = (BodyAxes::Frd, BodyAxes::Flu);
-        let mechanism = if self.gimbal_frame.is_some() { USUAL_MECHANISM } else { "rigid" };
+        let on_gimbal = self.gimbal_frame.is_some() || self.camera_moves;
+        let mechanism = if on_gimbal { USUAL_MECHANISM } else { "rigid" };
         let choices = RigChoices {
             name: name.to_owned(),
             camera: self.camera(),
@@ -97,11 +95,8 @@ impl VideoFacts {
             position_m: None,
             imu_topic: imu,
             // The video's own IMU moves with the camera on the gimbal; its axes are those of the camera, as converted.
-            gimbal_imu_topic: [CAMERA_IMU, CAMERA_IMU_0]
-                .into_iter()
-                .find(|topic| self.has_autopilot && log.topic(topic).is_some())
-                .map(str::to_owned),
-            gimbal_imu_axes: Some(flu),
+            gimbal_imu_topic: None,
+            gimbal_imu_axes: (!self.has_unknown_axes).then_some(flu),
             image_topic: Some(VIDEO_TOPIC.to_owned()),
             joint_topic: None,
             joint_names: Vec::new(),
@@ -111,11 +106,9 @@ impl VideoFacts {
         let template = RigTemplate::new(&choices, Some(log));
         let of_container =
             || RigTemplate::new(&RigChoices { resolution_px: Some(self.resolution_px), ..choices.clone() }, Some(log));
-        let mut template = template.or_else(|error| match error {
+        template.or_else(|error| match error {
             TemplateError::NoSize { .. } => of_container(),
             other => Err(other),
-        })?;
-        template.imu.accelerometer_topic = accelerometer;
-        Ok(template)
+        })
     }
 }

@@ -56,6 +56,12 @@ fn of_gimbal(topic: &str) -> bool {
     ["gimbal", "mount"].iter().any(|word| topic.to_ascii_lowercase().contains(word))
 }
 
+/// True for the topic of an accelerometer whose gyroscope has a topic with the same start.
+fn has_own_gyroscope(topic: &str, all: &[String]) -> bool {
+    let gyroscope = topic.strip_suffix("/accelerometer").map(|start| format!("{start}/gyroscope"));
+    gyroscope.is_some_and(|gyroscope| all.contains(&gyroscope))
+}
+
 impl TopicFields {
     pub(super) fn new(log: &FlightLog) -> Self {
         let named = |info: &TopicInfo| info.topic.clone();
@@ -70,11 +76,16 @@ impl TopicFields {
             AngleField::Joints(_) | AngleField::None => true,
             AngleField::Attitude(topic, _) => of_gimbal(topic),
         });
-        let (imus, images) = (log.topics_of(&[MessageKind::Imu]), log.topics_of(&MessageKind::IMAGES));
+        let (all_imus, images) = (log.topics_of(&[MessageKind::Imu]), log.topics_of(&MessageKind::IMAGES));
+        let halves = are_halves(&all_imus);
+        let imus: Vec<String> =
+            all_imus.iter().filter(|topic| halves || !has_own_gyroscope(topic, &all_imus)).cloned().collect();
+        // The IMU of a camera may move on a gimbal.
+        let of_vehicle = imus.iter().find(|topic| !topic.starts_with("/camera/")).or_else(|| imus.first());
         let vehicles: Vec<String> = VEHICLE_KINDS.iter().flat_map(|kind| log.topics_of(&[*kind])).collect();
         let first_of_gimbal = images.iter().find(|topic| of_gimbal(topic)).or_else(|| images.first());
         Self {
-            imu: imus.first().cloned().filter(|_| imus.len() > 1 && !are_halves(&imus)),
+            imu: of_vehicle.cloned().filter(|_| imus.len() > 1 && !halves),
             image: first_of_gimbal.cloned(),
             angles: angles.cloned().unwrap_or(AngleField::None),
             frame: AttitudeFrame::Body,
