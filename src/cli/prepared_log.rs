@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
-use dcvins::export::{ConversionStage, ConvertedLogs, LogSources, PreparedLog, prepare_log};
+use dcvins::export::{ConversionStage, ConvertedLogs, LogSources, PreparedLog, SourceError, prepare_log};
+use dcvins::flight_log::convert::ConvertError;
 use dcvins::flight_log::{LogLimits, log_name};
 
 use crate::cli::estimation_arguments::EstimationArguments;
@@ -62,13 +63,18 @@ pub(crate) fn prepare(sources: &[PathBuf], rig: Option<&Path>, limits: &LogLimit
     let mut gathered = LogSources::gather(sources, limits)?;
     gathered.rig = rig.map(Path::to_owned).or(gathered.rig);
     let cache = converted_logs();
-    let interrupt = Interrupt::watch().ok();
+    let interrupt = Interrupt::watch()?;
     let progress = Progress::new();
     let prepared = prepare_log(&gathered, cache.as_ref().map_err(|reason| *reason), limits, &mut |stage, ratio| {
         progress.show(ratio, || stage_text(stage, &gathered));
-        interrupt.as_ref().map_or(std::ops::ControlFlow::Continue(()), Interrupt::control_flow)
+        interrupt.control_flow()
     })?;
     drop(progress);
+    if interrupt.is_set() {
+        // A signal after the last progress of the conversion: its log is kept, and the command does not begin.
+        return Err(SourceError::from(ConvertError::Interrupted { path: gathered.main }).into());
+    }
+    interrupt.release();
     if !prepared.notes.is_empty() {
         let kind = prepared.kind.unwrap_or("recording");
         notify(&format!("dcvins: converted {} ({kind}) into {}", log_name(&gathered.main), prepared.log.display()));

@@ -46,6 +46,32 @@ fn a_bag_is_checked_like_a_log_and_kept_in_the_cache() {
     assert!(code == 1 && problem.contains("DCVINS_CACHE_DIR is empty"), "{problem}");
 }
 
+/// Ctrl+C after the conversion ends the command at once, as on a log that needs none.
+#[cfg(target_os = "linux")]
+#[test]
+fn an_interrupt_after_the_conversion_ends_the_command() {
+    use std::io::{BufRead as _, BufReader, Read as _};
+    use std::process::Stdio;
+
+    let folder = tempfile::tempdir().unwrap();
+    let (bag, cache) = (folder.path().join("flight"), folder.path().join("cache"));
+    fs::create_dir(&bag).unwrap();
+    fs::copy(sample("garden.mcap"), bag.join("flight_0.mcap")).unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_dcvins"));
+    command.env("DCVINS_CACHE_DIR", &cache).arg("check").arg(&bag).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut process = command.spawn().expect("the program starts");
+    let mut notices = BufReader::new(process.stderr.take().expect("it is piped"));
+    let mut line = String::new();
+    while !line.contains("converted flight (ROS 2 bag)") {
+        line.clear();
+        assert!(notices.read_line(&mut line).unwrap() > 0, "it ends without a conversion");
+    }
+    assert!(Command::new("kill").args(["-INT", &process.id().to_string()]).status().unwrap().success());
+    let mut printed = String::new();
+    process.stdout.take().expect("it is piped").read_to_string(&mut printed).unwrap();
+    assert_eq!((process.wait().unwrap().code(), printed.as_str()), (None, ""), "the check goes on");
+}
+
 #[test]
 fn what_cannot_be_opened_is_named_with_what_it_lacks() {
     let folder = tempfile::tempdir().unwrap();
