@@ -76,6 +76,7 @@ impl EstimationArguments {
     pub(crate) fn request(&self, log_path: PathBuf) -> SessionRequest {
         SessionRequest {
             log_path,
+            recording: Vec::new(),
             rig_path: self.rig.clone(),
             ground_truth_path: self.ground_truth.clone(),
             specs: self.runs.clone(),

@@ -4,7 +4,9 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use dcvins::export::{ConvertedLogs, LogSources, PreparedLog, SourceError, is_session, prepare_log, read_session};
+use dcvins::export::{
+    ConvertedLogs, LogSources, PreparedLog, SourceError, is_session, prepare_log, prepare_session, read_session,
+};
 use dcvins::flight_log::convert::SourceKind;
 use dcvins::flight_log::{FlightLog, LogError, LogLimits, log_name, missing_sensors, rig_candidates};
 use dcvins::gui::app::{OpenFailure, OpenProgress, OpenRequest, OpenedLog, RigQuestion};
@@ -27,14 +29,19 @@ pub(crate) fn open_log(
 ) -> Result<OpenedLog, OpenFailure> {
     let limits = estimation.limits.limits();
     let sources = LogSources::gather(&request.sources, &limits).map_err(|error| failure(&error))?;
+    let cache = converted_logs();
     if is_session(&sources.main) {
         let problem = |text: String| OpenFailure::Problem(text);
         let saved = read_session(&sources.main).map_err(|error| problem(error.to_string()))?;
+        let saved =
+            prepare_session(saved, cache.as_ref().map_err(|reason| *reason), &limits, &mut |of, stage, ratio| {
+                progress(OpenProgress { text: stage_text(stage, of), ratio })
+            });
+        let saved = saved.map_err(|error| failure(&error))?;
         let session = saved.open().map_err(|error| problem(format!("{error}: {}", sources.main.display())))?;
         return Ok(OpenedLog { log: Box::new(session), remembered: sources.main, notices: Vec::new() });
     }
     let sources = LogSources { rig: request.rig.clone().or(sources.rig), ..sources };
-    let cache = converted_logs();
     let prepared = prepare_log(&sources, cache.as_ref().map_err(|reason| *reason), &limits, &mut |stage, ratio| {
         progress(OpenProgress { text: stage_text(stage, &sources), ratio })
     });
@@ -44,6 +51,7 @@ pub(crate) fn open_log(
     let beside = of_recording.first().map(|path| ConvertedLogs::path_beside(path, "rig.yaml"));
     let beside = beside.filter(|path| path.is_file());
     let session_request = SessionRequest {
+        recording: of_recording.clone(),
         rig_path: prepared.rig.clone().or_else(|| estimation.rig.clone()).or(beside),
         ground_truth_path: prepared.ground_truth.clone().or_else(|| estimation.ground_truth.clone()),
         ..estimation.request(prepared.log.clone())

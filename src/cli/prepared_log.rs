@@ -1,11 +1,15 @@
 //! Sources of commands: a recording is converted into the cache folder before the command runs on its log.
 
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
-use dcvins::export::{ConversionStage, ConvertedLogs, LogSources, PreparedLog, SourceError, prepare_log};
+use dcvins::export::{
+    ConversionStage, ConvertedLogs, LogSources, PreparedLog, SourceError, prepare_log, prepare_session, read_session,
+};
 use dcvins::flight_log::convert::ConvertError;
 use dcvins::flight_log::{LogLimits, log_name};
+use dcvins::session::SavedSession;
 
 use crate::cli::estimation_arguments::EstimationArguments;
 use crate::cli::interrupt::Interrupt;
@@ -63,18 +67,11 @@ pub(crate) fn prepare(sources: &[PathBuf], rig: Option<&Path>, limits: &LogLimit
     let mut gathered = LogSources::gather(sources, limits)?;
     gathered.rig = rig.map(Path::to_owned).or(gathered.rig);
     let cache = converted_logs();
-    let interrupt = Interrupt::watch()?;
-    let progress = Progress::new();
-    let prepared = prepare_log(&gathered, cache.as_ref().map_err(|reason| *reason), limits, &mut |stage, ratio| {
-        progress.show(ratio, || stage_text(stage, &gathered));
-        interrupt.control_flow()
+    let prepared = watched(&gathered.main, |progress| {
+        Ok(prepare_log(&gathered, cache.as_ref().map_err(|reason| *reason), limits, &mut |stage, ratio| {
+            progress(&gathered, stage, ratio)
+        })?)
     })?;
-    drop(progress);
-    if interrupt.is_set() {
-        // A signal after the last progress of the conversion: its log is kept, and the command does not begin.
-        return Err(SourceError::from(ConvertError::Interrupted { path: gathered.main }).into());
-    }
-    interrupt.release();
     if !prepared.notes.is_empty() {
         let kind = prepared.kind.unwrap_or("recording");
         notify(&format!("dcvins: converted {} ({kind}) into {}", log_name(&gathered.main), prepared.log.display()));
@@ -83,6 +80,35 @@ pub(crate) fn prepare(sources: &[PathBuf], rig: Option<&Path>, limits: &LogLimit
         }
     }
     Ok(prepared)
+}
+
+/// Saved session whose log exists; it is converted again, with a progress bar, if it is no longer in the cache.
+///
+/// # Errors
+/// When the file is no session, its recording cannot be converted, or after Ctrl+C.
+pub(crate) fn prepared_session(path: &Path, limits: &LogLimits) -> Result<SavedSession> {
+    let (saved, cache) = (read_session(path)?, converted_logs());
+    watched(path, |progress| Ok(prepare_session(saved, cache.as_ref().map_err(|reason| *reason), limits, progress)?))
+}
+
+/// Receives the stage of the conversion of sources and the completed fraction.
+type ConversionProgress<'a> = dyn FnMut(&LogSources, ConversionStage, f64) -> ControlFlow<()> + 'a;
+
+/// Result of a conversion of `source` that shows its progress and ends at Ctrl+C.
+fn watched<T>(source: &Path, convert: impl FnOnce(&mut ConversionProgress<'_>) -> Result<T>) -> Result<T> {
+    let interrupt = Interrupt::watch()?;
+    let progress = Progress::new();
+    let converted = convert(&mut |of, stage, ratio| {
+        progress.show(ratio, || stage_text(stage, of));
+        interrupt.control_flow()
+    })?;
+    drop(progress);
+    if interrupt.is_set() {
+        // A signal after the last progress of the conversion: its log is kept, and the command does not begin.
+        return Err(SourceError::from(ConvertError::Interrupted { path: source.to_owned() }).into());
+    }
+    interrupt.release();
+    Ok(converted)
 }
 
 /// True for a recording that has to be converted.

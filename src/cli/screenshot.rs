@@ -7,7 +7,7 @@ use anyhow::{Context as _, Result, bail};
 use clap::{Args, ValueEnum};
 use dcvins::export::{
     PANEL_NAMES, Renderer, STUDY_PANEL_NAMES, ScreenshotOptions, check_screenshot, draw_panel, draw_panel_svg,
-    figure_bytes, is_session, panel_csv, png_bytes, read_session, write_screenshot,
+    figure_bytes, is_session, panel_csv, png_bytes, write_screenshot,
 };
 use dcvins::flight_log::{ImageReader, log_name};
 use dcvins::geometry::{ns_from_seconds, seconds_from_ns};
@@ -25,7 +25,7 @@ use crate::cli::estimation_arguments::EstimationArguments;
 use crate::cli::exit::ExitOutcome;
 use crate::cli::figure_arguments::FigureArguments;
 use crate::cli::interrupt::Interrupt;
-use crate::cli::prepared_log::prepared_log;
+use crate::cli::prepared_log::{prepared_log, prepared_session};
 use crate::cli::report::own_command_line;
 use crate::cli::result_cache::{CacheArguments, CachedResult};
 use crate::cli::study_arguments::{StudyArguments, StudyPicture, write_study_picture};
@@ -394,7 +394,7 @@ impl Shown {
             if !arguments.estimation.runs.is_empty() {
                 bail!("a saved session contains its runs: leave --run out");
             }
-            let saved = read_session(&arguments.log)?;
+            let saved = prepared_session(&arguments.log, &arguments.estimation.limits.limits())?;
             let (start_s, duration_s) = (saved.start_s, saved.duration_s);
             (Source::Saved(Box::new(saved.open()?)), start_s, duration_s)
         } else {

@@ -6,6 +6,7 @@ use std::process::Command;
 
 use dcvins::flight_log::urdf::{CameraAxes, RobotModel};
 use dcvins::sensors::Rig;
+use dcvins::session::{Session, SessionRequest};
 
 fn sample(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("sample_logs").join(name)
@@ -70,6 +71,40 @@ fn an_interrupt_after_the_conversion_ends_the_command() {
     let mut printed = String::new();
     process.stdout.take().expect("it is piped").read_to_string(&mut printed).unwrap();
     assert_eq!((process.wait().unwrap().code(), printed.as_str()), (None, ""), "the check goes on");
+}
+
+#[test]
+fn a_session_on_a_converted_recording_converts_it_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let (bag, cache) = (folder.path().join("flight"), folder.path().join("cache"));
+    fs::create_dir(&bag).unwrap();
+    fs::copy(sample("garden.mcap"), bag.join("flight_0.mcap")).unwrap();
+    dcvins(&cache, &["check", &bag.display().to_string()]);
+    let entry = fs::read_dir(cache.join("converted")).unwrap().next().expect("one entry").unwrap().path();
+    let log_path = entry.join("flight.mcap");
+    let request = SessionRequest {
+        log_path: log_path.clone(),
+        recording: vec![bag.clone()],
+        duration_s: Some(3.0),
+        ..SessionRequest::default()
+    };
+    let mut session = Session::open(&request).unwrap();
+    session.finish();
+    let saved = folder.path().join("a.session.json");
+    fs::write(&saved, session.saved(None).to_text()).unwrap();
+    drop(session);
+    fs::remove_dir_all(&entry).unwrap();
+    let picture = folder.path().join("a.png").display().to_string();
+    let (saved, at) = (saved.display().to_string(), ["--at", "2.9", "-o", &picture]);
+    let (code, _, problem) = dcvins(&cache, &[&["screenshot", &saved, "--panel", "convergence"][..], &at].concat());
+    assert!(code == 0 && log_path.is_file(), "{problem}");
+    assert!(!problem.contains("differs"), "{problem}");
+    // Without the recording the error names it.
+    fs::remove_dir_all(&entry).unwrap();
+    fs::remove_dir_all(&bag).unwrap();
+    let (code, _, problem) =
+        dcvins(&cache, &[&["screenshot", &saved, "--panel", "convergence", "--force"][..], &at].concat());
+    assert!(code == 1 && problem.contains(&bag.display().to_string()), "{problem}");
 }
 
 #[test]

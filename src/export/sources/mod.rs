@@ -6,6 +6,7 @@
 mod converted_logs;
 mod error;
 mod prepare;
+mod saved_session;
 #[cfg(test)]
 mod tests;
 
@@ -16,6 +17,7 @@ use std::path::{Path, PathBuf};
 pub use self::converted_logs::ConvertedLogs;
 pub use self::error::SourceError;
 pub use self::prepare::{ConversionStage, PreparedLog, prepare_log};
+pub use self::saved_session::prepare_session;
 use super::session_file::is_session;
 use crate::flight_log::convert::{AutopilotLog, SourceKind, source_kind};
 use crate::flight_log::{LogLimits, is_imu_file_of, is_rig_name, log_name};

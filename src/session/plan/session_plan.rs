@@ -21,6 +21,8 @@ use crate::text::Named as _;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SessionRequest {
     pub log_path: PathBuf,
+    /// Files of the recording that the log was converted from; empty for any other log.
+    pub recording: Vec<PathBuf>,
     /// Path of the rig file; `None` if it is next to the log or inside it.
     pub rig_path: Option<PathBuf>,
     /// Path of the ground-truth rig file; `None` if it is next to the log.
@@ -46,6 +48,8 @@ pub struct SessionRequest {
 pub struct SessionPlan {
     pub log: Arc<FlightLog>,
     pub log_path: PathBuf,
+    /// Files of the recording that the log was converted from; empty for any other log.
+    pub recording: Vec<PathBuf>,
     /// Path of the rig file, if it was given.
     pub rig_path: Option<PathBuf>,
     /// Path of the ground-truth rig file, if it was given.
@@ -126,6 +130,7 @@ impl SessionPlan {
             position_truth,
             log,
             log_path: request.log_path.clone(),
+            recording: request.recording.clone(),
             rig_path: request.rig_path.clone(),
             ground_truth_path: request.ground_truth_path.clone(),
             rig: Arc::new(rig),

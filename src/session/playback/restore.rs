@@ -65,6 +65,7 @@ impl Session {
         SavedSession {
             session_version: VERSION,
             log: SavedLog { path: absolute(&self.plan.log_path), bytes: log.size_bytes(), crc32: log.checksum() },
+            recording: self.plan.recording.iter().map(absolute).collect(),
             rig: self.plan.rig_path.as_ref().map(absolute),
             ground_truth: self.plan.ground_truth_path.as_ref().map(absolute),
             truth_trajectory: self.plan.truth_request.0.as_ref().map(|source| absolute_source(source).to_string()),

@@ -38,6 +38,9 @@ pub struct SavedSession {
     pub session_version: u32,
     /// The log, with a checksum to identify it.
     pub log: SavedLog,
+    /// Paths of the recording that the log was converted from; empty for any other log.
+    #[serde(default, skip_serializing_if = "Vec::is_empty", with = "super::saved_path::several")]
+    pub recording: Vec<PathBuf>,
     /// Path of the rig file, if it was given.
     #[serde(default, with = "super::saved_path::optional")]
     pub rig: Option<PathBuf>,
@@ -127,6 +130,7 @@ impl SavedSession {
             truth_trajectory: truth.transpose().map_err(entry_error)?,
             lever_arm: lever_arm.transpose().map_err(entry_error)?,
             log_path: self.log.path.clone(),
+            recording: self.recording.clone(),
             rig_path: self.rig.clone(),
             ground_truth_path: self.ground_truth.clone(),
             specs: specs.map_err(entry_error)?,
@@ -163,6 +167,7 @@ mod tests {
         let session = SavedSession {
             session_version: VERSION,
             log: SavedLog { path: path(b"/logs/\xff.mcap"), bytes: 1, crc32: 2 },
+            recording: vec![path(b"/logs/\xfd.mp4"), path(b"/logs/flight.ulg")],
             rig: Some(path(b"/logs/\xfe.rig.yaml")),
             ground_truth: Some(path(b"/logs/plain.yaml")),
             truth_trajectory: None,
@@ -184,7 +189,8 @@ mod tests {
             text.replace("\"session_version\": 2", "\"session_version\": 1").replace("\"markers\"", "\"markers_ns\"");
         let old = SavedSession::from_text(&old).unwrap();
         assert_eq!(old, SavedSession { session_version: 1, ..session.clone() });
-        let none = SavedSession { rig: None, ..session };
+        let none = SavedSession { rig: None, recording: Vec::new(), ..session };
+        assert!(!none.to_text().contains("recording"));
         assert_eq!(SavedSession::from_text(&none.to_text()).unwrap(), none);
     }
 }

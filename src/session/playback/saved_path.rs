@@ -61,3 +61,16 @@ pub(super) mod optional {
         Ok(Option::<Written>::deserialize(deserializer)?.map(PathBuf::from))
     }
 }
+
+/// The same representation for a list of paths.
+pub(super) mod several {
+    use super::{Deserialize as _, Deserializer, PathBuf, Serialize as _, Serializer, Written};
+
+    pub(in super::super) fn serialize<S: Serializer>(paths: &[PathBuf], serializer: S) -> Result<S::Ok, S::Error> {
+        paths.iter().map(|path| Written::from(path.as_path())).collect::<Vec<_>>().serialize(serializer)
+    }
+
+    pub(in super::super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<PathBuf>, D::Error> {
+        Ok(Vec::<Written>::deserialize(deserializer)?.into_iter().map(PathBuf::from).collect())
+    }
+}
