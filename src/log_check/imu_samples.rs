@@ -11,8 +11,22 @@ use crate::sensors::ImuSample;
 /// Stamps of the messages that are no measurement, by reason.
 pub(super) type UnmeasuredStamps = BTreeMap<Unmeasured, Vec<i64>>;
 
-/// Samples with all six values in the order of their stamps, from messages in any order.
-pub(super) fn measured(messages: Vec<ImuSample>, dropped: &mut UnmeasuredStamps) -> Vec<ImuSample> {
+/// Samples with all six values in the order of their stamps, from messages in any order; with forces of a separate
+/// `accelerometer` those of the messages are not used, and it is left ordered and without what is no measurement.
+pub(super) fn measured(
+    messages: Vec<ImuSample>,
+    accelerometer: &mut Vec<(i64, Vector3<f64>)>,
+    dropped: &mut UnmeasuredStamps,
+) -> Vec<ImuSample> {
+    if accelerometer.is_empty() {
+        measured_together(messages, dropped)
+    } else {
+        measured_apart(&messages, accelerometer, dropped)
+    }
+}
+
+/// Samples of an IMU whose messages have all six values.
+fn measured_together(messages: Vec<ImuSample>, dropped: &mut UnmeasuredStamps) -> Vec<ImuSample> {
     let has_forces = messages.iter().any(|sample| is_measured(&sample.specific_force_m_per_s2));
     let reason = |sample: &ImuSample| {
         Unmeasured::of(&sample.angular_velocity_rad_per_s, &sample.specific_force_m_per_s2, has_forces)
@@ -20,9 +34,8 @@ pub(super) fn measured(messages: Vec<ImuSample>, dropped: &mut UnmeasuredStamps)
     filtered(messages, reason, dropped)
 }
 
-/// Samples of a gyroscope with the specific forces of a separate accelerometer, both in any order; the forces are left
-/// ordered and without those that are no measurement.
-pub(super) fn measured_apart(
+/// Samples of a gyroscope with the specific forces of a separate accelerometer, both in any order.
+fn measured_apart(
     gyroscope: &[ImuSample],
     accelerometer: &mut Vec<(i64, Vector3<f64>)>,
     dropped: &mut UnmeasuredStamps,

@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use super::attitude::{AttitudeSurvey, SolvedAttitude};
 use super::gradient_sums::GradientSums;
 use super::image_measure::{ImageMeasure, measure};
-use super::imu_samples::{UnmeasuredStamps, measured, measured_apart};
+use super::imu_samples::{UnmeasuredStamps, measured};
 use super::statistics::white_sigma;
 use super::topic_survey::{Times, TopicSurvey};
 use crate::flight_log::container::DecodedBlock;
@@ -147,17 +147,9 @@ impl Survey {
         if let Some(gimbal) = rig.and_then(|rig| rig.gimbal.as_ref()) {
             survey.set_joints(gimbal);
         }
-        let dropped = &mut UnmeasuredStamps::default();
-        survey.gimbal_imu = if survey.gimbal_accelerometer.is_empty() {
-            measured(std::mem::take(&mut survey.gimbal_imu), dropped)
-        } else {
-            measured_apart(&survey.gimbal_imu, &mut survey.gimbal_accelerometer, dropped)
-        };
-        survey.imu = if survey.accelerometer.is_empty() {
-            measured(std::mem::take(&mut survey.imu), &mut survey.unmeasured)
-        } else {
-            measured_apart(&survey.imu, &mut survey.accelerometer, &mut survey.unmeasured)
-        };
+        let Self { imu, accelerometer, gimbal_imu, gimbal_accelerometer, unmeasured, .. } = &mut survey;
+        *gimbal_imu = measured(std::mem::take(gimbal_imu), gimbal_accelerometer, &mut UnmeasuredStamps::default());
+        *imu = measured(std::mem::take(imu), accelerometer, unmeasured);
         survey
     }
 

@@ -12,6 +12,14 @@ fn sample(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("sample_logs").join(name)
 }
 
+/// Paths of a ROS 2 bag with the sample log, made in a folder, and of the cache beside it.
+fn bag_and_cache(folder: &Path) -> [PathBuf; 2] {
+    let bag = folder.join("flight");
+    fs::create_dir(&bag).expect("the folder is new");
+    fs::copy(sample("garden.mcap"), bag.join("flight_0.mcap")).expect("the sample log is there");
+    [bag, folder.join("cache")]
+}
+
 /// Runs the program with a cache folder; returns its exit code, standard output and standard error.
 fn dcvins(cache: &Path, arguments: &[&str]) -> (i32, String, String) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_dcvins"));
@@ -24,9 +32,7 @@ fn dcvins(cache: &Path, arguments: &[&str]) -> (i32, String, String) {
 #[test]
 fn a_bag_is_checked_like_a_log_and_kept_in_the_cache() {
     let folder = tempfile::tempdir().unwrap();
-    let (bag, cache) = (folder.path().join("flight"), folder.path().join("cache"));
-    fs::create_dir(&bag).unwrap();
-    fs::copy(sample("garden.mcap"), bag.join("flight_0.mcap")).unwrap();
+    let [bag, cache] = bag_and_cache(folder.path());
     let bag = bag.display().to_string();
     let (code, text, notices) = dcvins(&cache, &["check", &bag]);
     assert_eq!(code, 0, "{notices}");
@@ -55,9 +61,7 @@ fn an_interrupt_after_the_conversion_ends_the_command() {
     use std::process::Stdio;
 
     let folder = tempfile::tempdir().unwrap();
-    let (bag, cache) = (folder.path().join("flight"), folder.path().join("cache"));
-    fs::create_dir(&bag).unwrap();
-    fs::copy(sample("garden.mcap"), bag.join("flight_0.mcap")).unwrap();
+    let [bag, cache] = bag_and_cache(folder.path());
     let mut command = Command::new(env!("CARGO_BIN_EXE_dcvins"));
     command.env("DCVINS_CACHE_DIR", &cache).arg("check").arg(&bag).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut process = command.spawn().expect("the program starts");
@@ -76,9 +80,7 @@ fn an_interrupt_after_the_conversion_ends_the_command() {
 #[test]
 fn a_session_on_a_converted_recording_converts_it_again() {
     let folder = tempfile::tempdir().unwrap();
-    let (bag, cache) = (folder.path().join("flight"), folder.path().join("cache"));
-    fs::create_dir(&bag).unwrap();
-    fs::copy(sample("garden.mcap"), bag.join("flight_0.mcap")).unwrap();
+    let [bag, cache] = bag_and_cache(folder.path());
     dcvins(&cache, &["check", &bag.display().to_string()]);
     let entry = fs::read_dir(cache.join("converted")).unwrap().next().expect("one entry").unwrap().path();
     let log_path = entry.join("flight.mcap");

@@ -70,28 +70,30 @@ pub enum VideoAlignmentError {
 
 impl fmt::Display for VideoAlignment {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let clock = self.clock;
+        let offset_sigma_s = match &self.evidence {
+            AlignmentEvidence::Rotations { alignment, .. } => alignment.offset_sigma_s,
+            AlignmentEvidence::Forces(found) => found.offset_sigma_s,
+        };
+        write!(
+            out,
+            "the video starts {:+.3} s after the first measurement of the autopilot's log (σ {:.1} ms), drift {:+.0} ",
+            self.clock.offset_s,
+            1e3 * offset_sigma_s,
+            self.clock.drift_ppm,
+        )?;
         let (reference, found) = match &self.evidence {
             AlignmentEvidence::Rotations { reference, alignment } => (reference, alignment),
             AlignmentEvidence::Forces(found) => {
                 return write!(
                     out,
-                    "the video starts {:+.3} s after the first measurement of the autopilot's log (σ {:.1} ms), drift {:+.0} ppm: \
-                     the specific forces of both IMUs have a correlation of {:.2}",
-                    clock.offset_s,
-                    1e3 * found.offset_sigma_s,
-                    clock.drift_ppm,
-                    found.correlation,
+                    "ppm: the specific forces of both IMUs have a correlation of {:.2}",
+                    found.correlation
                 );
             }
         };
         write!(
             out,
-            "the video starts {:+.3} s after the first measurement of the autopilot's log (σ {:.1} ms), drift {:+.0} ± {:.0} ppm: \
-             {:.0} % of {} rotations of the images, {:.2}° each, are explained by {}, with residuals of {:.2}°",
-            clock.offset_s,
-            1e3 * found.offset_sigma_s,
-            found.drift_ppm,
+            "± {:.0} ppm: {:.0} % of {} rotations of the images, {:.2}° each, are explained by {}, with residuals of {:.2}°",
             found.drift_sigma_ppm,
             100.0 * found.explained,
             found.rotations,

@@ -45,7 +45,7 @@ impl WeightedMean {
     }
 }
 
-/// What the window around a new feature shows.
+/// Content of the window around a new feature.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum WindowContent {
     Plane,
