@@ -4,11 +4,12 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
-use dcvins::export::{
-    ConversionStage, ConvertedLogs, LogSources, PreparedLog, SourceError, prepare_log, prepare_session, read_session,
-};
+use dcvins::export::{ConversionStage, ConvertedLogs, LogSources, PreparedLog, SourceError, prepare_log};
+#[cfg(feature = "gui")]
+use dcvins::export::{prepare_session, read_session};
 use dcvins::flight_log::convert::ConvertError;
 use dcvins::flight_log::{LogLimits, log_name};
+#[cfg(feature = "gui")]
 use dcvins::session::SavedSession;
 
 use crate::cli::estimation_arguments::EstimationArguments;
@@ -86,6 +87,7 @@ pub(crate) fn prepare(sources: &[PathBuf], rig: Option<&Path>, limits: &LogLimit
 ///
 /// # Errors
 /// When the file is no session, its recording cannot be converted, or after Ctrl+C.
+#[cfg(feature = "gui")]
 pub(crate) fn prepared_session(path: &Path, limits: &LogLimits) -> Result<SavedSession> {
     let (saved, cache) = (read_session(path)?, converted_logs());
     watched(path, |progress| Ok(prepare_session(saved, cache.as_ref().map_err(|reason| *reason), limits, progress)?))
