@@ -5,28 +5,23 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector, Vector3, Vector6};
 
 use super::arrow::ArrowMatrix;
-use super::chain_prior::ChainTerm;
+use super::border_prior::{BorderPriorFactor, BorderTerm};
 use super::frame_sets::FrameSet;
 use super::pairs::{ViewPair, ViewRows, add_pairs};
 use super::state::{BundleEstimate, Camera, Columns, ViewId, ViewMap};
 use super::visual::{self, BundleTrack, PixelModel, ReducedVisualEquations, VisualEquations};
 use crate::estimator::factors::costs::Costs;
 use crate::estimator::factors::encoder::EncoderFactor;
-use crate::estimator::factors::factor::{Factor, JacobianBlock, NavigationColumns, Sink, WhitenedRows};
+use crate::estimator::factors::factor::{NavigationColumns, Sink, WhitenedRows};
 use crate::estimator::factors::imu::ImuFactor;
 use crate::estimator::factors::kind::FactorLabel;
 use crate::estimator::factors::start_prior::{StartPrior, StartPriorFactor};
-use crate::geometry::{RigidTransform, so3};
 use crate::optimization::CameraPose;
 
 #[derive(Clone, Debug)]
 pub(super) struct Priors {
-    pub(super) chain: ChainTerm,
-    /// Given `imu_from_camera` of the static camera.
-    pub(super) extrinsics: RigidTransform,
-    /// Standard deviations of the extrinsics per axis, in metres and radians.
-    pub(super) extrinsics_sigmas: (f64, f64),
-    pub(super) time_shift_sigma_s: f64,
+    /// Prior on extrinsics, time offsets and chain.
+    pub(super) border: BorderTerm,
     /// Prior on the first frame set, which fixes the gauge, and on its biases.
     pub(super) start: StartPrior,
 }
@@ -39,13 +34,6 @@ pub(super) struct Bundle<'a> {
     pub(super) priors: &'a Priors,
     pub(super) pixels: PixelModel<'a>,
     pub(super) tracks: &'a [BundleTrack],
-}
-
-/// Priors on the border: one row per column.
-struct BorderPrior<'a> {
-    priors: &'a Priors,
-    columns: Columns,
-    estimate: &'a BundleEstimate,
 }
 
 /// Normal equations; those of the visual factors are kept over the view poses.
@@ -125,8 +113,8 @@ impl Bundle<'_> {
         })
     }
 
-    fn border_prior<'s>(&'s self, estimate: &'s BundleEstimate) -> BorderPrior<'s> {
-        BorderPrior { priors: self.priors, columns: self.columns, estimate }
+    fn border_prior<'s>(&'s self, estimate: &'s BundleEstimate) -> BorderPriorFactor<'s> {
+        BorderPriorFactor { term: &self.priors.border, columns: self.columns, estimate }
     }
 
     /// Columns of a navigation state in the band.
@@ -231,46 +219,6 @@ impl Bundle<'_> {
             (*view, Vector6::from_column_slice(moved.as_slice()))
         };
         equations.maps.iter().map(step).collect()
-    }
-}
-
-impl BorderPrior<'_> {
-    /// Whitened Jacobian (borders × borders) and residual.
-    fn jacobian_and_residual(&self) -> (DMatrix<f64>, DVector<f64>) {
-        let Self { priors, columns, estimate } = self;
-        let count = columns.borders();
-        let (mut rows, mut residual) = (DMatrix::zeros(count, count), DVector::zeros(count));
-        let (translation_m, rotation_rad) = priors.extrinsics_sigmas;
-        let change = estimate.extrinsics.minus(&priors.extrinsics);
-        let rotation_error: Vector3<f64> = change.fixed_rows::<3>(0).into_owned();
-        rows.fixed_view_mut::<3, 3>(0, 0).copy_from(&(so3::right_jacobian_inverse(&rotation_error) / rotation_rad));
-        residual.fixed_rows_mut::<3>(0).copy_from(&(rotation_error / rotation_rad));
-        for axis in 3..6 {
-            rows[(axis, axis)] = 1.0 / translation_m;
-            residual[axis] = change[axis] / translation_m;
-        }
-        for (column, shift_s) in
-            [(Columns::STATIC_SHIFT, estimate.shifts_s[0]), (columns.gimbal_shift(), estimate.shifts_s[1])]
-        {
-            rows[(column, column)] = 1.0 / priors.time_shift_sigma_s;
-            residual[column] = shift_s / priors.time_shift_sigma_s;
-        }
-        let chain = Columns::CHAIN..columns.gimbal_shift();
-        rows.view_range_mut(chain.clone(), chain.clone()).copy_from(priors.chain.jacobian());
-        residual.rows_range_mut(chain).copy_from(&priors.chain.residual(&estimate.chain));
-        (rows, residual)
-    }
-}
-
-impl Factor for BorderPrior<'_> {
-    fn label(&self) -> FactorLabel {
-        FactorLabel::CalibrationPrior
-    }
-
-    fn rows<S: Sink>(&self, sink: &mut S) {
-        let (jacobian, residual) = self.jacobian_and_residual();
-        let blocks = [JacobianBlock { start: self.columns.band(), entries: jacobian.as_slice() }];
-        sink.add(self.label(), &WhitenedRows { residual: residual.as_slice(), blocks: &blocks, products: None });
     }
 }
 

@@ -5,6 +5,7 @@ use std::ops::ControlFlow;
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::batch::batch_trajectory;
+use super::border_prior::BorderTerm;
 use super::bundle::{Priors, gimbal_view};
 use super::chain_prior::ChainTerm;
 use super::frame_sets::{FrameSet, ImuBuffer, frame_sets};
@@ -19,9 +20,12 @@ use super::statistics::Statistics;
 use super::trajectory::InitialTrajectory;
 use super::{CalibrationError, CalibrationInput, CalibrationOptions, observations, trajectory};
 use crate::estimator::factors::start_prior::StartPrior;
-use crate::estimator::{ColumnBlock, ColumnId, ImuBias, Linearization, NavigationState, gravity_in_world, imu_factor};
+use crate::estimator::{
+    CalibrationPosterior, CameraPosterior, ColumnBlock, ColumnId, ImuBias, Linearization, NavigationState,
+    gravity_in_world, imu_factor,
+};
 use crate::geometry::{RigidTransform, seconds_from_ns};
-use crate::gimbal::Chain;
+use crate::gimbal::{Chain, ClassicalChain, ParameterId, Parameterization};
 use crate::observability::{RankReport, analyse};
 use crate::sensors::JointAngles;
 
@@ -96,9 +100,9 @@ pub fn calibrate_along(
             })
             .collect(),
         navigation,
-        extrinsics: input.static_camera.imu_from_camera,
-        shifts_s: [0.0; 2],
-        chain: priors.chain.given.clone(),
+        extrinsics: priors.border.extrinsics,
+        shifts_s: priors.border.shifts_s,
+        chain: priors.border.chain.given.clone(),
         landmarks: Vec::new(),
     };
     let static_tracks = observations::collect(input, options, &frame_sets, Camera::Static, &|_| true);
@@ -156,7 +160,7 @@ pub fn calibrate_along(
         chain: both.estimate.chain.to_classical(),
         given_chain: input.gimbal_camera.chain.clone(),
         parameterization: both.estimate.chain.parameterization(),
-        parameters: parameters(&priors.chain, &both.estimate.chain, &chain_sigmas),
+        parameters: parameters(&priors.border.rig, &both.estimate.chain, &chain_sigmas),
         pixels: [
             pixels(&both, Camera::Static).ok_or_else(|| singular(BOTH))?,
             pixels(&both, Camera::Gimbal).ok_or_else(|| singular(BOTH))?,
@@ -173,6 +177,7 @@ pub fn calibrate_along(
             &both.pose_covariances,
         ),
         warnings: warnings(counts, &segments, &frame_sets),
+        posterior: posterior(&both, &priors.border),
         visited_rad,
     })
 }
@@ -251,10 +256,7 @@ fn check_measurements(
 
 fn priors(input: &CalibrationInput, options: &CalibrationOptions, navigation: &[NavigationState]) -> Priors {
     Priors {
-        chain: ChainTerm::new(&input.gimbal_camera.chain, &input.gimbal_camera.prior),
-        extrinsics: input.static_camera.imu_from_camera,
-        extrinsics_sigmas: input.static_camera.prior.sigmas(),
-        time_shift_sigma_s: options.time_shift_sigma_s,
+        border: BorderTerm::new(input, options),
         start: StartPrior {
             reference: navigation.first().map_or_else(RigidTransform::identity, |first| first.world_from_imu),
             bias: ImuBias::default(),
@@ -282,7 +284,7 @@ fn close_loops(
             frame_sets[frame_set].gimbal.as_ref().map_or_else(none, |gimbal| gimbal.encoder.clone())
         },
     );
-    let loops = PoseLoops { segments: &pairs, prior: &priors.chain };
+    let loops = PoseLoops { segments: &pairs, prior: &priors.border.chain };
     let solution = loops.solve().ok_or_else(|| singular(LOOPS))?;
     let gaps = Statistics::of(&loops.gaps_m(&solution)).ok_or_else(|| singular(LOOPS))?;
     Ok((solution, gaps))
@@ -295,6 +297,31 @@ fn extrinsics_report(input: &CalibrationInput, result: &StageResult) -> Extrinsi
         imu_from_camera: result.estimate.extrinsics,
         sigmas: std::array::from_fn(|axis| sigma(Columns::EXTRINSICS + axis)),
         time_shift_s: (result.estimate.shifts_s[0], sigma(Columns::STATIC_SHIFT)),
+    }
+}
+
+/// Calibration of the gimbal camera, then of the static one, with their joint covariance; time offsets relative to the
+/// rig's.
+fn posterior(result: &StageResult, prior: &BorderTerm) -> CalibrationPosterior {
+    let (columns, estimate) = (result.columns(), &result.estimate);
+    let chain: Vec<usize> = (Columns::CHAIN..=columns.gimbal_shift()).collect();
+    let order: Vec<usize> = chain.iter().copied().chain(0..=Columns::STATIC_SHIFT).collect();
+    let camera = |chain: &Chain, shift_s: f64, columns: &[usize]| CameraPosterior {
+        chain: chain.to_classical(),
+        parameterization: chain.parameterization(),
+        parameters: chain.parameters().into_iter().chain([ParameterId::timeshift(0)]).collect(),
+        values: chain.values().iter().copied().chain([shift_s]).collect(),
+        rig_sigmas: columns.iter().map(|column| prior.rig_sigmas[*column]).collect(),
+    };
+    let mount = ClassicalChain { imu_from_base: estimate.extrinsics, ..ClassicalChain::default() };
+    let mount = Chain::from_classical(&mount, Parameterization::Minimal);
+    let cameras = [
+        (&estimate.chain, estimate.shifts_s[1], &order[..chain.len()]),
+        (&mount, estimate.shifts_s[0], &order[chain.len()..]),
+    ];
+    CalibrationPosterior {
+        cameras: cameras.into_iter().map(|(chain, shift_s, columns)| camera(chain, shift_s, columns)).collect(),
+        covariance: result.covariance.select_rows(&order).select_columns(&order),
     }
 }
 

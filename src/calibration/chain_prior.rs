@@ -1,14 +1,14 @@
-//! Rig's prior on the chain as a least-squares term in the minimal parameterization.
+//! Prior on the chain as a least-squares term, of the rig or of earlier flights.
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::gimbal::{Chain, ClassicalChain, auto_parameterization};
+use crate::gimbal::{Chain, ClassicalChain, Parameterization};
 use crate::sensors::ChainPrior;
 
 /// Variance added to every column, so that the covariance stays regular when the prior fixes a column.
 const MIN_VARIANCE: f64 = 1e-12;
 
-/// Given chain in its best minimal parameterization, with its prior.
+/// Given chain with its prior.
 #[derive(Clone, Debug)]
 pub(super) struct ChainTerm {
     pub(super) given: Chain,
@@ -18,21 +18,32 @@ pub(super) struct ChainTerm {
     square_root_information: DMatrix<f64>,
 }
 
+/// `W` (n × n) with `WᵀW` the inverse of a covariance; of its diagonal alone where it is not positive definite.
+pub(super) fn square_root_information(mut covariance: DMatrix<f64>) -> DMatrix<f64> {
+    let count = covariance.nrows();
+    for k in 0..count {
+        covariance[(k, k)] += MIN_VARIANCE;
+    }
+    let sigmas = covariance.diagonal().map(f64::sqrt);
+    covariance
+        .cholesky()
+        .and_then(|factor| factor.l().solve_lower_triangular(&DMatrix::identity(count, count)))
+        .unwrap_or_else(|| DMatrix::from_diagonal(&sigmas.map(|sigma| 1.0 / sigma)))
+}
+
 impl ChainTerm {
-    pub(super) fn new(classical: &ClassicalChain, prior: &ChainPrior) -> Self {
-        let given = Chain::from_classical(classical, auto_parameterization(classical));
+    /// Rig's prior on its chain in a parameterization.
+    pub(super) fn new(classical: &ClassicalChain, prior: &ChainPrior, parameterization: Parameterization) -> Self {
+        let given = Chain::from_classical(classical, parameterization);
         let (translation_m, rotation_rad) = prior.sigmas();
-        let mut covariance = given.prior_covariance(classical, translation_m, rotation_rad);
-        for k in 0..covariance.nrows() {
-            covariance[(k, k)] += MIN_VARIANCE;
-        }
-        let prior_sigmas = covariance.diagonal().map(f64::sqrt);
-        let dof = given.dof();
-        let square_root_information = covariance
-            .cholesky()
-            .and_then(|factor| factor.l().solve_lower_triangular(&DMatrix::identity(dof, dof)))
-            .unwrap_or_else(|| DMatrix::from_diagonal(&prior_sigmas.map(|sigma| 1.0 / sigma)));
-        Self { given, prior_sigmas, square_root_information }
+        let covariance = given.prior_covariance(classical, translation_m, rotation_rad);
+        Self::with_covariance(given, covariance)
+    }
+
+    /// Prior with this covariance of the chain's columns (dof × dof).
+    pub(super) fn with_covariance(given: Chain, covariance: DMatrix<f64>) -> Self {
+        let prior_sigmas = covariance.diagonal().map(|variance| (variance + MIN_VARIANCE).sqrt());
+        Self { given, prior_sigmas, square_root_information: square_root_information(covariance) }
     }
 
     /// Whitened difference `W·(chain ⊟ given)` (dof × 1).

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::camera::CameraModel;
-use crate::estimator::EstimatorConfig;
+use crate::estimator::{CalibrationPosterior, EstimatorConfig};
 use crate::frontend::TrackedFrame;
 use crate::geometry::RigidTransform;
 use crate::gimbal::ClassicalChain;
@@ -48,6 +48,16 @@ pub struct GimbalCamera {
     pub views: Vec<TrackedView>,
 }
 
+/// Posterior of earlier flights as prior of a calibration.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EarlierFlights {
+    pub posterior: CalibrationPosterior,
+    /// Places of static and gimbal camera among the cameras of the posterior; the rig's prior holds for a missing one.
+    pub places: [Option<usize>; 2],
+    /// Time offsets of both cameras in the rig, in seconds.
+    pub given_shifts_s: [f64; 2],
+}
+
 /// Tracked images, IMU samples and encoder readings of a flight with both cameras.
 #[derive(Clone, Debug)]
 pub struct CalibrationInput {
@@ -56,6 +66,8 @@ pub struct CalibrationInput {
     pub gimbal_camera: GimbalCamera,
     pub imu_noise: ImuNoise,
     pub gravity_m_per_s2: f64,
+    /// Posterior of earlier flights, from which values and prior of the calibration are taken.
+    pub earlier: Option<EarlierFlights>,
     /// Configuration of the estimator that processes the static camera for the initial trajectory.
     pub estimator: EstimatorConfig,
 }

@@ -16,6 +16,7 @@
 
 mod arrow;
 mod batch;
+mod border_prior;
 mod bundle;
 mod calibrate;
 mod chain_prior;
@@ -44,7 +45,7 @@ pub use batch::BatchPose;
 pub use calibrate::{CalibrationProgress, calibrate, calibrate_along};
 pub use error::CalibrationError;
 pub use imu_noise::{FittedDensity, FlightNoise, ImuNoiseError, NoiseDensity, fit_imu_noise};
-pub use input::{CalibrationInput, GimbalCamera, StaticCamera, TrackedView};
+pub use input::{CalibrationInput, EarlierFlights, GimbalCamera, StaticCamera, TrackedView};
 pub use options::CalibrationOptions;
 pub use outcome::{
     CalibratedParameter, CalibrationOutcome, ChainDistance, ExtrinsicsReport, ImuResidualReport, PixelReport,

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::batch::BatchPose;
 use super::statistics::Statistics;
+use crate::estimator::CalibrationPosterior;
 use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::{ClassicalChain, ParameterId, Parameterization};
 use crate::observability::RankReport;
@@ -98,6 +99,8 @@ pub struct CalibrationOutcome {
     pub given_chain: ClassicalChain,
     /// Parameterization of the estimated chain.
     pub parameterization: Parameterization,
+    /// Gimbal camera, then static camera, as prior of another flight; time offsets relative to the rig's.
+    pub posterior: CalibrationPosterior,
     /// Parameters of the chain, in the order of its columns.
     pub parameters: Vec<CalibratedParameter>,
     /// Reprojection residuals of the bundle, static camera first.

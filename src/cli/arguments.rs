@@ -8,6 +8,7 @@ use crate::cli::convert::ConvertArguments;
 use crate::cli::degeneracy::DegeneracyArguments;
 use crate::cli::diagnose::DiagnoseArguments;
 use crate::cli::evaluate::EvaluateArguments;
+use crate::cli::excerpt::ExcerptArguments;
 use crate::cli::exit;
 use crate::cli::export::ExportArguments;
 use crate::cli::generate::GenerateArguments;
@@ -77,6 +78,9 @@ pub(crate) enum Command {
     /// Plan the motion of joints and vehicle that leaves the calibration of a rig with the smallest σ.
     #[command(after_help = exit::INTERRUPTIBLE)]
     Plan(PlanArguments),
+    /// Write the stretches of a log that keep its information about the calibration.
+    #[command(after_help = exit::INTERRUPTIBLE)]
+    Excerpt(ExcerptArguments),
     /// Convert a EuRoC/ASL folder, a ROS bag, an MP4 video or a log of an autopilot into a log.
     #[command(after_help = exit::INTERRUPTIBLE)]
     Convert(ConvertArguments),

@@ -80,6 +80,7 @@ impl EstimationArguments {
             rig_path: self.rig.clone(),
             ground_truth_path: self.ground_truth.clone(),
             specs: self.runs.clone(),
+            prior: None,
             trajectories: self.trajectories.clone(),
             truth_trajectory: self.truth_trajectory.clone(),
             lever_arm: self.lever_arm,

@@ -9,6 +9,7 @@ mod degeneracy;
 mod diagnose;
 mod estimation_arguments;
 mod evaluate;
+mod excerpt;
 mod exit;
 mod export;
 #[cfg(feature = "gui")]
@@ -21,6 +22,7 @@ mod noise;
 mod open_log;
 mod plan;
 mod prepared_log;
+mod prior_arguments;
 mod report;
 #[cfg(feature = "gui")]
 mod report_figures;
@@ -74,6 +76,7 @@ pub(crate) fn run() -> anyhow::Result<ExitOutcome> {
         Command::SweepJob(arguments) => sweep::sweep_job(&arguments),
         Command::Degeneracy(arguments) => done(degeneracy::degeneracy(&arguments)),
         Command::Plan(arguments) => plan::plan(&arguments),
+        Command::Excerpt(arguments) => excerpt::excerpt(&arguments),
         Command::Convert(arguments) => convert::convert(&arguments),
         Command::Evaluate(arguments) => done(evaluate::evaluate(&arguments)),
         Command::Export(arguments) => done(export::export(&arguments)),

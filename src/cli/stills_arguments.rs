@@ -19,19 +19,19 @@ pub(crate) struct StillsArguments {
     #[arg(long, value_name = "FILE")]
     pub stills: Option<PathBuf>,
     /// Judge the chain of a rig or JSON file on the stills instead of calibrating.
-    #[arg(long, value_name = "FILE", requires = "stills", conflicts_with = "log")]
+    #[arg(long, value_name = "FILE", requires = "stills", conflicts_with = "logs")]
     pub chain: Option<PathBuf>,
     /// Use of the joint readings of the stills.
-    #[arg(long, value_enum, default_value_t = JointAnglesArgument::Encoder, requires = "stills", conflicts_with_all = ["chain", "log"])]
+    #[arg(long, value_enum, default_value_t = JointAnglesArgument::Encoder, requires = "stills", conflicts_with_all = ["chain", "logs"])]
     pub joint_angles: JointAnglesArgument,
     /// Number of groups of stations; each is left out once for the hold-out error.
     #[arg(
         long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u16).range(2..=100),
-        requires = "stills", conflicts_with_all = ["chain", "log"]
+        requires = "stills", conflicts_with_all = ["chain", "logs"]
     )]
     pub folds: u16,
     /// Ids of sets that are not used.
-    #[arg(long, value_name = "ID,…", value_delimiter = ',', requires = "stills", conflicts_with = "log")]
+    #[arg(long, value_name = "ID,…", value_delimiter = ',', requires = "stills", conflicts_with = "logs")]
     pub without: Vec<u64>,
 }
 

@@ -3,6 +3,7 @@
 use super::config::EstimatorConfig;
 use super::report::{Phase, StepReport};
 use super::start::initializer::{InitializationStep, Initializer};
+use super::state::calibration_posterior::CalibrationPosterior;
 use super::state::calibrations::{Calibrations, MAIN};
 use super::state::earlier_pass::BiasPrior;
 use super::state::earlier_pass::EarlierPass;
@@ -137,6 +138,30 @@ impl Estimator {
 const SIGMA_FACTOR: f64 = 2.0;
 
 impl Estimator {
+    /// Calibration of the current estimate with its covariance, as prior of another flight. `None` before the first
+    /// window, with a fixed calibration, and if the information is not positive definite.
+    ///
+    /// The intrinsics of the IMU are not included.
+    pub fn posterior(&self) -> Option<CalibrationPosterior> {
+        let PhaseState::Tracking(window) = &self.phase else { return None };
+        if window.state.calibration.dof() == 0 {
+            return None;
+        }
+        let covariances = covariances::covariances(&self.setup, &window.state)?;
+        window.state.calibration.posterior(&covariances.calibration)
+    }
+
+    /// Calibration before any measurement, with the covariance of its prior.
+    #[cfg(test)]
+    pub(crate) fn start_posterior(&self) -> CalibrationPosterior {
+        let calibrations = self.calibration();
+        let count = calibrations.dof();
+        let information = calibrations.prior_jacobian();
+        let covariance = information.tr_mul(&information).cholesky().expect("a regular prior").inverse();
+        assert_eq!(covariance.nrows(), count);
+        calibrations.posterior(&covariance).expect("a free calibration")
+    }
+
     /// Prior of another pass over the measurements from the current estimate: calibration with its covariance, and
     /// biases at the start of the log, `duration_s` before the newest image. Standard deviations are doubled. `None`
     /// before the first window, and if the information is not positive definite.

@@ -41,6 +41,7 @@ pub use report::{
     PoseCovariance, ReportBytes, ResidualSummary, StageTimes, StepReport, StepWarning,
 };
 pub use state::allocation::allocated_bytes;
+pub use state::calibration_posterior::{CalibrationPosterior, CalibrationPrior, CameraPosterior};
 pub use state::columns::{ColumnBlock, ColumnGroup, ColumnId, FrameId};
 pub use state::earlier_pass::{BiasPrior, EarlierPass};
 pub use state::gimbal_imu::GimbalImuState;

@@ -7,13 +7,14 @@ use super::covariance::covariance_of_calibration;
 use super::error::ExportError;
 use super::folder_files::{remove_others, write_files};
 use super::masks;
+use super::posterior::{POSTERIOR, posterior_of_calibration};
 use super::trajectory::tum_of_calibration;
 use crate::geometry::Dimension;
 use crate::session::CalibrationRun;
 
 pub(super) const TRAJECTORY_FILES: [&str; 2] = ["trajectory.tum", "covariance.csv"];
 
-/// Writes `rig.yaml`, `calibration.json` and `report.txt` into a folder, and on request the trajectory with its
+/// Writes `rig.yaml`, `calibration.json`, `posterior.json` and `report.txt` into a folder, and on request the trajectory with its
 /// covariances.
 ///
 /// # Errors
@@ -33,6 +34,7 @@ pub fn write_calibration(
         ("calibration.json", format!("{json}\n")),
         ("rig.yaml", format!("{}{}", rig.to_yaml(), sigmas_yaml(&report.parameterization, sigmas))),
         ("report.txt", report.to_string()),
+        (POSTERIOR, posterior_of_calibration(run)),
     ];
     if trajectory {
         let texts = [tum_of_calibration(run), covariance_of_calibration(run)];

@@ -5,6 +5,7 @@ use std::fmt;
 use nalgebra::Matrix4;
 use serde::Serialize;
 
+use super::posterior::{FlightEntry, SigmaTable};
 use crate::calibration::{CalibrationOutcome, ExtrinsicsReport, PixelReport, PoseLoopReport, Statistics};
 use crate::flight_log::log_name;
 use crate::geometry::{Dimension, RigidTransform, seconds_from_ns, so3};
@@ -79,10 +80,16 @@ pub struct CalibrationReport {
     /// Errors against ground truth, `None` if there is none.
     #[serde(rename = "truth")]
     pub ground_truth: Option<CalibrationErrors>,
+    /// Standard deviations of all parameters under the rig's prior and after each flight.
+    pub flights: Vec<FlightEntry>,
+    /// The same as a table, `None` if the calibration did not start from other flights.
+    #[serde(skip)]
+    flight_table: Option<SigmaTable>,
     pub warnings: Vec<String>,
 }
 
 pub fn report_calibration(run: &CalibrationRun) -> CalibrationReport {
+    let flights = SigmaTable::of_calibration(run);
     let outcome = &run.outcome;
     let zero = vec![0.0; outcome.chain.joint_count()];
     let mut warnings = outcome.warnings.clone();
@@ -107,6 +114,8 @@ pub fn report_calibration(run: &CalibrationRun) -> CalibrationReport {
             verdict: rank.verdict(&run.given_rig.parameter_names()),
         }),
         ground_truth: run.errors(),
+        flights: flights.entries(),
+        flight_table: run.prior.is_some().then_some(flights),
         warnings,
     }
 }
@@ -279,6 +288,9 @@ impl fmt::Display for CalibrationReport {
                     distance.rotation_std_rad.to_degrees()
                 )?;
             }
+        }
+        if let Some(flights) = &self.flight_table {
+            write!(f, "\n{flights}")?;
         }
         for warning in &self.warnings {
             writeln!(f, "  warning      {warning}")?;

@@ -22,6 +22,9 @@ pub enum ExportError {
     /// A file is not a motion of joints and vehicle.
     #[error("cannot read the motion: {problem}: {path}")]
     Motion { problem: String, path: PathBuf },
+    /// A file is not the posterior of a calibration.
+    #[error("cannot start from this calibration: {problem}: {path}")]
+    Posterior { problem: String, path: PathBuf },
     #[error(transparent)]
     Log(#[from] LogError),
     /// Two trajectories cannot be compared.

@@ -13,12 +13,13 @@ use serde_json::Value;
 use super::calibration_files::TRAJECTORY_FILES;
 use super::error::ExportError;
 use super::masks::is_mask_name;
+use super::posterior::POSTERIOR;
 use super::stills_files::STILLS_FILES;
 use crate::flight_log::output;
 use crate::flight_log::{FlightLog, log_name, shortened};
 
 /// Names of all files that a run can write.
-pub(crate) const RUN_FILES: [&str; 10] = [
+pub(crate) const RUN_FILES: [&str; 11] = [
     "summary.json",
     "trajectory.tum",
     "covariance.csv",
@@ -27,12 +28,13 @@ pub(crate) const RUN_FILES: [&str; 10] = [
     "information.csv",
     "frames.csv",
     "rig.yaml",
+    POSTERIOR,
     "trajectory.euroc.csv",
     "results.mcap",
 ];
 const REPORT_FILES: [&str; 2] = ["report.json", "report.html"];
-const CALIBRATION_FILES: [&str; 5] =
-    ["calibration.json", "rig.yaml", "report.txt", TRAJECTORY_FILES[0], TRAJECTORY_FILES[1]];
+const CALIBRATION_FILES: [&str; 6] =
+    ["calibration.json", "rig.yaml", POSTERIOR, "report.txt", TRAJECTORY_FILES[0], TRAJECTORY_FILES[1]];
 /// Size limit of a file that is read for the name of its log.
 const LARGEST_INDEX_BYTES: u64 = 64 << 20;
 

@@ -6,6 +6,7 @@ mod covariance;
 mod error;
 mod euroc;
 mod evaluation;
+mod excerpt_files;
 pub(crate) mod existing;
 #[cfg(feature = "gui")]
 mod figure;
@@ -16,6 +17,7 @@ pub(crate) mod masks;
 mod motion_csv;
 mod noise_files;
 mod plan_files;
+mod posterior;
 pub(crate) mod result_cache;
 mod results;
 pub(crate) mod run_files;
@@ -37,6 +39,9 @@ pub use calibration_report::{CalibrationReport, report_calibration};
 pub use error::ExportError;
 pub use euroc::{EurocCamera, EurocReport, check_euroc_folder, write_euroc};
 pub use evaluation::{EvaluationOptions, EvaluationReport, evaluate};
+pub use excerpt_files::{
+    ExcerptParameter, ExcerptStretch, ExcerptSummary, check_excerpt_folder, write_excerpt_index, write_stretches,
+};
 pub use existing::{
     check_calibration_folder, check_converted_log, check_report_folder, check_run_folders, check_screenshot,
     check_simulated_log, check_stills_folder, other_runs, write_new_rig,
@@ -48,6 +53,7 @@ pub use masks::write_masks;
 pub use motion_csv::read_motion;
 pub use noise_files::{write_allan, write_flight_noise};
 pub use plan_files::{PlanReport, PlannedFlight, check_plan_folder, write_plan};
+pub use posterior::{FlightEntry, SigmaTable, prior_of_calibration, prior_of_run, read_prior};
 pub use result_cache::{CachedFile, ResultCache, ResultKey, ResultKeyBuilder};
 pub use run_files::{RunFileOptions, write_run};
 #[cfg(feature = "gui")]

@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 
 use super::covariance::covariance_csv;
 use super::error::ExportError;
+use super::folder_files::remove_others;
 use super::masks;
+use super::posterior::{POSTERIOR, posterior_of_run};
 use super::results::stage_results;
 use super::tables::{calibration_csv, frames_csv, information_csv, rank_csv};
 use super::trajectory::{euroc_of_run, tum_of_run};
@@ -48,6 +50,9 @@ pub fn write_run(
     let (folder, summary) = stage_run(recording, run, folder, options, &mut outputs)?;
     outputs.commit().map_err(ExportError::commit)?;
     remove_unwritten(&folder, options)?;
+    if run.posterior.is_none() {
+        remove_others(&[POSTERIOR], &[], &folder)?;
+    }
     Ok((folder, summary))
 }
 
@@ -77,6 +82,8 @@ pub(crate) fn stage_run(
         ("frames.csv", frames_csv(run, options.timing)),
         ("rig.yaml", rig.to_yaml()),
     ];
+    let posterior = posterior_of_run(recording, run);
+    files.extend(posterior.map(|text| (POSTERIOR, text)));
     if options.euroc_trajectory {
         files.push((EUROC_TRAJECTORY, euroc_of_run(run, recording.epoch_ns)));
     }

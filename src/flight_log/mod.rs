@@ -9,6 +9,7 @@ pub(crate) mod container;
 pub mod convert;
 pub mod csv_writer;
 mod error;
+mod excerpt;
 mod file;
 mod foreign;
 mod geodesy;
@@ -47,6 +48,7 @@ mod writer;
 pub(crate) mod yaml;
 
 pub use error::LogError;
+pub use excerpt::{ExcerptReport, write_excerpt};
 pub use image_reader::ImageReader;
 pub use limits::{LimitExceeded, LimitKind, LimitSetting, LogLimits};
 pub use log::FlightLog;

@@ -25,6 +25,7 @@ mod redundancy;
 mod report;
 mod slide;
 mod slide_direction;
+mod stretches;
 mod structure;
 #[cfg(test)]
 mod tests;
@@ -43,4 +44,5 @@ pub use redundancy::Redundancy;
 pub use report::{CalibrationDirection, Deficit, RankReport};
 pub use slide::{ChainSlide, chain_of_step, slide};
 pub use slide_direction::{InvalidSlide, SlideDirection, SlidePosition, SlideRequest};
+pub use stretches::{InformationTrack, UsefulStretch, UsefulStretches};
 pub use structure::{KnownDirection, KnownLoss, MIN_SPURIOUS_GAIN, known_losses};

@@ -36,20 +36,20 @@ pub use engine::{
     image_rotations, situation_before_flight,
 };
 pub use plan::{
-    DEFAULT_MEMORY_BUDGET_BYTES, EstimatorTuning, FORK_PARAMETERIZATIONS, ForkChanges, ForkError, ImageFlip, ImageHalf,
-    LoadedPositions, LoadedTrajectory, MAX_RUNS, MAX_TRAJECTORIES, MeasurementCorrection, ParameterizationChoice,
-    RunSpec, RunSpecError, SessionError, SessionPlan, SessionRequest, TrajectorySource, TrajectorySpec,
-    TrajectorySpecError,
+    DEFAULT_MEMORY_BUDGET_BYTES, EstimatorTuning, FORK_PARAMETERIZATIONS, FlightPrior, FlightSigmas, ForkChanges,
+    ForkError, ImageFlip, ImageHalf, LoadedPositions, LoadedTrajectory, MAX_RUNS, MAX_TRAJECTORIES,
+    MeasurementCorrection, ParameterizationChoice, RunSpec, RunSpecError, SessionError, SessionPlan, SessionRequest,
+    TrajectorySource, TrajectorySpec, TrajectorySpecError,
 };
 pub use playback::{
     Command, Cursor, DiagnosisProgress, FrameImage, Marker, Markers, MoveOutcome, Moved, PlaybackSpeed,
     SavedBreakpoint, SavedFork, SavedLog, SavedSession, SavedSessionError, Session, Wake,
 };
 pub use record::{
-    ComparedQuantity, Comparison, Divergence, FlightParameter, FlightVerdicts, ForkOrigin, ImageResiduals,
-    KnownLossSummary, LostSince, MeanResidual, ParameterSummary, PassProgress, PoseConsistency, PoseError,
-    PositionTruth, RELATIVE_LENGTHS_M, Recording, RelativeAccuracy, ResidualSum, RunMemory, RunRecord, RunSummary,
-    RunWarning, SolverPosition, SolverTrace, StageSummary, StepFactorRows, StepRecord, TrajectoryAccuracy,
+    CollectedInformation, ComparedQuantity, Comparison, Divergence, FlightParameter, FlightVerdicts, ForkOrigin,
+    ImageResiduals, KnownLossSummary, LostSince, MeanResidual, ParameterSummary, PassProgress, PoseConsistency,
+    PoseError, PositionTruth, RELATIVE_LENGTHS_M, Recording, RelativeAccuracy, ResidualSum, RunMemory, RunRecord,
+    RunSummary, RunWarning, SolverPosition, SolverTrace, StageSummary, StepFactorRows, StepRecord, TrajectoryAccuracy,
     TrajectoryEvaluation, TrajectoryLane, WarningLine, evaluate_trajectory, flight_advice, flight_headline,
     flight_table, least_determined, log_warning_lines, run_warning_lines, summarize, warning_lines,
 };

@@ -7,6 +7,7 @@ mod degeneracy;
 mod dependencies;
 mod documentation;
 mod evaluate;
+mod flights;
 mod hostile_logs;
 mod imports;
 mod layering;

@@ -3,8 +3,8 @@
 use nalgebra::{DVector, Vector3, Vector6};
 
 use super::fixture::{Flight, flight, true_states};
+use crate::calibration::border_prior::BorderTerm;
 use crate::calibration::bundle::{Bundle, Priors};
-use crate::calibration::chain_prior::ChainTerm;
 use crate::calibration::frame_sets::{FrameSet, frame_sets};
 use crate::calibration::state::{BundleEstimate, Camera, Columns, ViewId};
 use crate::calibration::visual::{BundleTrack, PixelModel};
@@ -40,13 +40,10 @@ fn example() -> Example {
     let states: Vec<_> = true_states(&flight).into_iter().map(Some).collect();
     let (frame_sets, navigation) = frame_sets(&flight.input, &options, &states);
     assert!(frame_sets.iter().filter(|frame_set| frame_set.gimbal.is_some()).count() > 4);
-    let term = ChainTerm::new(&flight.input.gimbal_camera.chain, &flight.input.gimbal_camera.prior);
-    let chain = term.given.clone();
+    let border = BorderTerm::new(&flight.input, &options);
+    let chain = border.chain.given.clone();
     let priors = Priors {
-        chain: term,
-        extrinsics: flight.input.static_camera.imu_from_camera,
-        extrinsics_sigmas: (0.003, 0.005),
-        time_shift_sigma_s: 0.01,
+        border,
         start: StartPrior {
             reference: navigation[0].world_from_imu,
             bias: ImuBias::default(),

@@ -62,6 +62,7 @@ pub(super) fn flight(options: &SyntheticOptions) -> Flight {
     let given = gimbal.given_rig.gimbal.clone().unwrap();
     let sigma_rad = given.encoder_sigma_rad.unwrap();
     let input = CalibrationInput {
+        earlier: None,
         static_camera: StaticCamera {
             key: "cam1".to_owned(),
             model: rigid.given_rig.cameras[0].model.clone(),

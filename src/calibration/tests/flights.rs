@@ -7,9 +7,10 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::fixture::{flight, true_states};
 use crate::calibration::{
-    CalibrationError, CalibrationOptions, ChainDistance, Statistics, calibrate, transform_distance,
+    CalibrationError, CalibrationInput, CalibrationOptions, CalibrationOutcome, ChainDistance, EarlierFlights,
+    Statistics, TrackedView, calibrate, transform_distance,
 };
-use crate::geometry::{Dimension, RigidTransform, vertical_angle, wrap_angle};
+use crate::geometry::{Dimension, RigidTransform, seconds_from_ns, vertical_angle, wrap_angle};
 use crate::gimbal::{Chain, ClassicalChain, Parameterization};
 use crate::sensors::ChainPrior;
 use crate::simulation::SyntheticOptions;
@@ -164,4 +165,54 @@ fn the_batch_trajectory_is_within_its_sigmas() {
     }
     let mean = nees.iter().sum::<f64>() / nees.len() as f64;
     assert!((2.0..14.0).contains(&mean), "NEES {mean} of {} poses", nees.len());
+}
+
+/// The part of a flight's images for which `keep` holds, by their stamps in seconds.
+fn part(flight: &super::fixture::Flight, keep: impl Fn(f64) -> bool) -> CalibrationInput {
+    let mut input = flight.input.clone();
+    let kept = |view: &TrackedView| keep(seconds_from_ns(view.stamp_ns));
+    input.static_camera.views.retain(kept);
+    input.gimbal_camera.views.retain(kept);
+    input
+}
+
+fn calibrated(mut input: CalibrationInput, earlier: Option<&CalibrationOutcome>) -> CalibrationOutcome {
+    input.earlier = earlier.map(|earlier| EarlierFlights {
+        posterior: earlier.posterior.clone(),
+        places: [Some(1), Some(0)],
+        given_shifts_s: [0.0; 2],
+    });
+    calibrate(&input, &CalibrationOptions::default(), &mut |_| ControlFlow::Continue(())).unwrap()
+}
+
+#[test]
+fn two_flights_add_up_in_either_order() {
+    let flight = flight(&SyntheticOptions { duration_s: 18.0, ..options(6) });
+    let halves = [part(&flight, |time_s| time_s < 9.0), part(&flight, |time_s| time_s >= 9.0)];
+    let alone = halves.clone().map(|half| calibrated(half, None));
+    let [first, second] = halves;
+    let both = [calibrated(second, Some(&alone[0])), calibrated(first, Some(&alone[1]))];
+    let sigmas = |outcome: &CalibrationOutcome| outcome.posterior.sigmas();
+    for (k, (a, b)) in sigmas(&both[0]).into_iter().zip(sigmas(&both[1])).enumerate() {
+        let least = sigmas(&alone[0])[k].min(sigmas(&alone[1])[k]);
+        assert!(a < 1.02 * least && b < 1.02 * least, "column {k}: {a}, {b} from {least}");
+        assert!((a / b).ln().abs() < 0.25, "column {k}: {a} and {b} by the order");
+    }
+    let form = both[0].parameterization;
+    for outcome in &both {
+        assert_eq!(outcome.parameterization, form);
+        let sigmas: Vec<f64> = outcome.parameters.iter().map(|parameter| parameter.sigma).collect();
+        let square = normalized_square(&outcome.chain, &sigmas, &flight.true_chain, form);
+        assert!(square < 4.0, "mean square of error over sigma {square}");
+        // The rig stays the reference of both flights.
+        let (of_both, of_one) = (&outcome.parameters, &alone[0].parameters);
+        for (one, both) in of_one.iter().zip(of_both) {
+            assert!((one.prior_sigma / both.prior_sigma - 1.0).abs() < 1e-6 && one.initial == both.initial);
+        }
+    }
+    let chains = both.each_ref().map(|outcome| Chain::from_classical(&outcome.chain, form));
+    let difference = chains[0].minus(&chains[1]);
+    for (k, parameter) in both[0].parameters.iter().enumerate() {
+        assert!(difference[k].abs() < 1.5 * parameter.sigma, "column {k}: {} of {}", difference[k], parameter.sigma);
+    }
 }

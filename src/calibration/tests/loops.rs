@@ -6,7 +6,7 @@ use crate::calibration::ChainDistance;
 use crate::calibration::chain_prior::ChainTerm;
 use crate::calibration::pose_loop::{LoopNoise, LoopState, PairedSegment, PoseLoops, PosePair, SegmentFrame};
 use crate::geometry::{RigidTransform, SplitMix64, so3, wrap_angle};
-use crate::gimbal::{Chain, ClassicalChain, Parameterization};
+use crate::gimbal::{Chain, ClassicalChain, Parameterization, auto_parameterization};
 use crate::optimization::RobustLoss;
 use crate::sensors::{ChainPrior, JointAngles, JointMotionFit};
 use crate::simulation::{SyntheticOptions, synthetic_tracks};
@@ -101,7 +101,7 @@ fn prior() -> ChainPrior {
 #[test]
 fn pose_loop_jacobians_meet_central_differences() {
     let example = example(3, 0.05, (0.0, 0.0), false);
-    let term = ChainTerm::new(&example.given, &prior());
+    let term = ChainTerm::new(&example.given, &prior(), auto_parameterization(&example.given));
     let loops = PoseLoops { segments: &example.segments, prior: &term };
     let noise = LoopNoise { rotation_rad: 0.01, position_m: 0.02, loss: RobustLoss::None };
     let state = LoopState {
@@ -150,7 +150,7 @@ fn pose_loop_jacobians_meet_central_differences() {
 fn exact_poses_recover_the_chain_up_to_encoder_noise() {
     for seed in 1..=4 {
         let example = example(seed, 1e-4, (0.0, 0.0), false);
-        let term = ChainTerm::new(&example.given, &prior());
+        let term = ChainTerm::new(&example.given, &prior(), auto_parameterization(&example.given));
         let solution = PoseLoops { segments: &example.segments, prior: &term }.solve().unwrap();
         let before = ChainDistance::over(&example.given, &example.ground_truth, &example.visited).unwrap();
         let after =
@@ -165,7 +165,7 @@ fn noisy_encoders_leave_the_chain_within_its_sigmas() {
     let (mut square, mut count) = (0.0, 0.0);
     for seed in 11..=16 {
         let example = example(seed, 0.1, (1e-3, 5e-3), false);
-        let term = ChainTerm::new(&example.given, &prior());
+        let term = ChainTerm::new(&example.given, &prior(), auto_parameterization(&example.given));
         let solution = PoseLoops { segments: &example.segments, prior: &term }.solve().unwrap();
         let ground_truth = Chain::from_classical(&example.ground_truth, solution.chain.parameterization());
         let error = solution.chain.minus(&ground_truth).map(wrap_angle);
@@ -184,7 +184,7 @@ fn noisy_encoders_leave_the_chain_within_its_sigmas() {
 fn stationary_joints_leave_unobservable_directions_at_the_prior() {
     let moving = example(5, 0.01, (0.0, 0.0), false);
     let example = example(5, 0.01, (0.0, 0.0), true);
-    let term = ChainTerm::new(&example.given, &prior());
+    let term = ChainTerm::new(&example.given, &prior(), auto_parameterization(&example.given));
     let solution = PoseLoops { segments: &example.segments, prior: &term }.solve().unwrap();
     let moved = PoseLoops { segments: &moving.segments, prior: &term }.solve().unwrap();
     let total = |covariance: &nalgebra::DMatrix<f64>| {

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::EstimatorOptions;
 use crate::camera::CameraModel;
+use crate::estimator::state::calibration_posterior::CalibrationPrior;
 use crate::estimator::state::earlier_pass::EarlierPass;
 use crate::estimator::state::imu_errors::{self, ImuErrors};
 use crate::geometry::RigidTransform;
@@ -52,6 +53,8 @@ pub struct EstimatorConfig {
     pub timeshift_s: f64,
     /// Rigid cameras in addition to the main one.
     pub rigid_cameras: Vec<RigidCamera>,
+    /// Calibrations of earlier flights: initial values and prior of the calibration, which replace the given chains.
+    pub calibration_prior: Option<Arc<CalibrationPrior>>,
     /// Result of an earlier pass over the same measurements: initial values and prior of the calibration, which replace
     /// the given chains, and prior of the biases.
     pub earlier_pass: Option<Arc<EarlierPass>>,
@@ -174,6 +177,7 @@ impl EstimatorConfig {
             sensor: CameraSensorPrior::of_rig(camera),
             timeshift_s: camera.timeshift_cam_imu_s,
             rigid_cameras: Vec::new(),
+            calibration_prior: None,
             earlier_pass: None,
             options: EstimatorOptions::default(),
             clock_ms: || 0.0,

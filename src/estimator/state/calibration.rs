@@ -7,8 +7,9 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
+use super::calibration_posterior::CameraPosterior;
 use super::earlier_pass::FoundCamera;
-use super::given_chain::{EarlierPrior, GivenChain, GivenSigmas};
+use super::given_chain::{EarlierPrior, GivenChain, GivenSigmas, PriorMeasurements};
 use super::sensor_columns::SensorColumn;
 use crate::camera::CameraModel;
 use crate::geometry::{RigidTransform, so3};
@@ -110,13 +111,31 @@ impl Calibration {
 
     /// This calibration at the values of an earlier pass, with that pass' covariance as its prior.
     pub(crate) fn with_found(self, found: &FoundCamera) -> Self {
+        self.with_values_of(found, PriorMeasurements::SameFlight)
+    }
+
+    /// This calibration at the values of another flight, with their covariance as its prior, in the same
+    /// parameterization; the values of `flight` after the chain's are absolute.
+    pub(crate) fn with_flight(self, flight: &FoundCamera) -> Self {
+        let parameterization = self.chain().parameterization();
+        let given = |parameter: ParameterId| self.sensor(parameter).map_or(0.0, |place| self.sensors[place].given);
+        let relative = flight.sensors.iter().map(|(parameter, value)| (*parameter, value - given(*parameter)));
+        let found = FoundCamera { sensors: relative.collect(), ..flight.clone() };
+        let mut calibration = self.with_values_of(&found, PriorMeasurements::OtherFlight);
+        if calibration.chain().parameterization() != parameterization {
+            calibration.switch_parameterization(parameterization);
+        }
+        calibration
+    }
+
+    fn with_values_of(self, found: &FoundCamera, measurements: PriorMeasurements) -> Self {
         if !self.free {
             return self;
         }
         let offsets = !self.chain().hides_joint_offsets();
         let chain = GivenChain::form(&found.chain, found.parameterization, offsets);
-        let rig = Arc::new(self.given.in_parameterization(found.parameterization, offsets));
-        // Columns that the earlier pass did not estimate keep the rig's prior.
+        let before = Arc::new(self.given.in_parameterization(found.parameterization, offsets));
+        // Columns that the earlier pass or flight did not estimate keep the rig's prior.
         let columns = chain.dof();
         let place_of = |column: &SensorColumn| {
             let place = found.sensors.iter().position(|(parameter, _)| *parameter == column.parameter);
@@ -132,7 +151,7 @@ impl Calibration {
         let expected =
             places[columns..].iter().map(|place| place.map_or(0.0, |place| found.sensors[place - columns].1));
         let expected = DVector::from_iterator(self.sensors.len(), expected);
-        let earlier = EarlierPrior { covariance, expected: expected.clone(), rig };
+        let earlier = EarlierPrior { measurements, covariance, expected: expected.clone(), before };
         Self {
             values: Values { chain: chain.clone(), sensors: expected },
             given: Arc::new(GivenChain::of_earlier_pass(&found.chain, chain, earlier)),
@@ -141,18 +160,20 @@ impl Calibration {
     }
 
     /// Prior of the next pass over the same measurements. Mean: current estimate. Information:
-    /// `Λ_rig + weight·(covariance⁻¹ − Λ_rig)`.
+    /// `Λ + weight·(covariance⁻¹ − Λ)` with `Λ` of the prior before the run's measurements.
     /// `None` when the covariance is not positive definite.
     pub(crate) fn next_pass_prior(&self, covariance: &DMatrix<f64>, weight: f64) -> Option<FoundCamera> {
         let chain = self.chain().dof();
         let carried = if self.free {
-            let rig = self.given.rig();
-            let mut of_rig = rig.square_root_information.tr_mul(&rig.square_root_information);
-            of_rig.resize_mut(self.dof(), self.dof(), 0.0);
-            for (place, column) in self.sensors.iter().enumerate() {
-                of_rig[(chain + place, chain + place)] = column.sigma.powi(-2);
+            let before = self.given.before_measurements();
+            let mut of_prior = before.square_root_information.tr_mul(&before.square_root_information);
+            of_prior.resize_mut(self.dof(), self.dof(), 0.0);
+            if before.earlier().is_none() {
+                for (place, column) in self.sensors.iter().enumerate() {
+                    of_prior[(chain + place, chain + place)] = column.sigma.powi(-2);
+                }
             }
-            let information = covariance.clone().cholesky()?.inverse() * weight + of_rig * (1.0 - weight);
+            let information = covariance.clone().cholesky()?.inverse() * weight + of_prior * (1.0 - weight);
             information.cholesky()?.inverse()
         } else {
             DMatrix::zeros(0, 0)
@@ -166,9 +187,8 @@ impl Calibration {
         })
     }
 
-    /// Standard deviations of `imu_from_camera` at these joint angles under the prior of an earlier pass, worst axis
-    /// each:
-    /// translation in metres, rotation in radians. `None` with the rig's prior.
+    /// Standard deviations of `imu_from_camera` at these joint angles under the prior of another flight or an earlier
+    /// pass, worst axis each: translation in metres, rotation in radians. `None` with the rig's prior.
     pub(crate) fn found_extrinsics_sigmas(&self, joints_rad: &[f64]) -> Option<(f64, f64)> {
         let earlier = self.given.earlier()?;
         let by_parameters = self.chain().linearize(self.own(joints_rad)).by_parameters;
@@ -458,5 +478,23 @@ impl Calibration {
         self.values.chain = given.form_of(&self.values.chain);
         self.given = Arc::new(given);
         old_from_new
+    }
+
+    /// Values with the standard deviations of the rig's prior, for another flight, and the derivative of their columns by
+    /// those of the estimate.
+    ///
+    /// `poe` is the only parameterization whose columns depend on the way on which its values were reached.
+    pub(crate) fn posterior(&self) -> (CameraPosterior, DMatrix<f64>) {
+        let (classical, parameterization) = (self.chain().to_classical(), self.chain().parameterization());
+        let mut by_columns = DMatrix::identity(self.values.dof(), self.values.dof());
+        let mut values = self.values();
+        if parameterization == Parameterization::Poe {
+            let chain = GivenChain::form(&classical, parameterization, !self.chain().hides_joint_offsets());
+            let by_chain = transport(self.chain(), &chain);
+            by_columns.view_mut((0, 0), by_chain.shape()).copy_from(&by_chain);
+            values.splice(..chain.dof(), chain.values().iter().copied());
+        }
+        let (parameters, rig_sigmas) = (self.parameters(), self.prior_sigmas().collect());
+        (CameraPosterior { chain: classical, parameterization, parameters, values, rig_sigmas }, by_columns)
     }
 }

@@ -5,6 +5,7 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 
 use super::calibration::Calibration;
+use super::calibration_posterior::CalibrationPosterior;
 use super::earlier_pass::FoundCamera;
 use super::imu_calibration::ImuCalibration;
 use super::imu_errors::{self, ImuErrors};
@@ -33,6 +34,35 @@ impl Calibrations {
     pub(crate) fn with_found(self, found: &[FoundCamera]) -> Self {
         let cameras = self.cameras.into_iter().zip(found).map(|(camera, found)| camera.with_found(found));
         Self { cameras: cameras.collect(), ..self }
+    }
+
+    /// These calibrations at the values of other flights, by camera; `None` keeps the rig's.
+    pub(crate) fn with_flights(self, flights: &[Option<FoundCamera>]) -> Self {
+        let cameras = self.cameras.into_iter().enumerate().map(|(place, camera)| {
+            let flight = flights.get(place).and_then(Option::as_ref);
+            match flight {
+                Some(flight) => camera.with_flight(flight),
+                None => camera,
+            }
+        });
+        Self { cameras: cameras.collect(), ..self }
+    }
+
+    /// Values of all cameras with `covariance`, that of all free columns; `None` if the calibration is fixed.
+    pub(crate) fn posterior(&self, covariance: &DMatrix<f64>) -> Option<CalibrationPosterior> {
+        let count: usize = self.cameras.iter().map(Calibration::dof).sum();
+        if count == 0 || count > covariance.nrows() {
+            return None;
+        }
+        let (mut cameras, mut by_estimate) = (Vec::new(), DMatrix::identity(count, count));
+        for (camera, one) in self.cameras.iter().enumerate() {
+            let (posterior, by_columns) = one.posterior();
+            let start = self.columns(camera).start;
+            by_estimate.view_mut((start, start), by_columns.shape()).copy_from(&by_columns);
+            cameras.push(posterior);
+        }
+        let own = covariance.view((0, 0), (count, count));
+        Some(CalibrationPosterior { cameras, covariance: &by_estimate * own * by_estimate.transpose() })
     }
 
     /// These calibrations with all columns of `wanted`.

@@ -1,4 +1,5 @@
-//! Initial chain of an estimator with its prior: of the rig, or of an earlier pass over the same measurements.
+//! Initial chain of an estimator with its prior: of the rig, of another flight, or of an earlier pass over the same
+//! measurements.
 
 use std::sync::Arc;
 
@@ -21,8 +22,8 @@ pub(super) struct GivenChain {
     uncertainty: Uncertainty,
     /// Prior standard deviations of the columns of `square_root_information`.
     prior_sigmas: DVector<f64>,
-    /// `W` with `WᵀW` the inverse of the prior covariance: of the chain's columns, or of all columns after an earlier
-    /// pass.
+    /// `W` with `WᵀW` the inverse of the prior covariance: of the chain's columns, or of all columns after another
+    /// flight or an earlier pass.
     pub(super) square_root_information: DMatrix<f64>,
 }
 
@@ -33,20 +34,29 @@ enum Uncertainty {
     Earlier(EarlierPrior),
 }
 
-/// Prior from an earlier pass.
+/// Prior from another flight or an earlier pass.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct EarlierPrior {
+    pub(super) measurements: PriorMeasurements,
     /// Covariance of all columns.
     pub(super) covariance: DMatrix<f64>,
     /// Values of the columns after the chain's, relative to the rig's.
     pub(super) expected: DVector<f64>,
-    /// Chain and prior of the rig.
-    pub(super) rig: Arc<GivenChain>,
+    /// Chain with the prior before that flight or pass.
+    pub(super) before: Arc<GivenChain>,
+}
+
+/// Measurements that a prior other than the rig's comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum PriorMeasurements {
+    /// Those of the run itself, in an earlier pass.
+    SameFlight,
+    OtherFlight,
 }
 
 impl EarlierPrior {
     /// This prior after conversion of the chain `from` to `to`, another parameterization of it.
-    fn transported(&self, from: &Chain, to: &Chain, rig: GivenChain) -> Self {
+    fn transported(&self, from: &Chain, to: &Chain, before: GivenChain) -> Self {
         let (old, new, sensors) = (from.dof(), to.dof(), self.expected.len());
         let part = |start: (usize, usize), size: (usize, usize)| self.covariance.view(start, size).into_owned();
         let chain = transport_covariance(from, &part((0, 0), (old, old)), to);
@@ -56,7 +66,7 @@ impl EarlierPrior {
         covariance.view_mut((0, new), (new, sensors)).copy_from(&chain_by_sensors);
         covariance.view_mut((new, 0), (sensors, new)).copy_from(&chain_by_sensors.transpose());
         covariance.view_mut((new, new), (sensors, sensors)).copy_from(&part((old, old), (sensors, sensors)));
-        Self { covariance, expected: self.expected.clone(), rig: Arc::new(rig) }
+        Self { covariance, expected: self.expected.clone(), before: Arc::new(before), measurements: self.measurements }
     }
 }
 
@@ -110,14 +120,14 @@ impl GivenChain {
             Uncertainty::Rig(sigmas) => Self::new(&self.classical, parameterization, *sigmas, joint_offsets),
             Uncertainty::Earlier(earlier) => {
                 let chain = Self::form(&self.classical, parameterization, joint_offsets);
-                let rig = earlier.rig.in_parameterization(parameterization, joint_offsets);
-                let earlier = earlier.transported(&self.chain, &chain, rig);
+                let before = earlier.before.in_parameterization(parameterization, joint_offsets);
+                let earlier = earlier.transported(&self.chain, &chain, before);
                 Self::of_earlier_pass(&self.classical, chain, earlier)
             }
         }
     }
 
-    /// Prior from an earlier pass, `None` if the chain is the rig's.
+    /// Prior from another flight or an earlier pass, `None` if the chain is the rig's.
     pub(super) fn earlier(&self) -> Option<&EarlierPrior> {
         match &self.uncertainty {
             Uncertainty::Rig(_) => None,
@@ -127,10 +137,18 @@ impl GivenChain {
 
     /// The rig's chain in the current parameterization.
     pub(super) fn rig(&self) -> &Self {
-        self.earlier().map_or(self, |earlier| &earlier.rig)
+        self.earlier().map_or(self, |earlier| earlier.before.rig())
     }
 
-    /// Standard deviation of the rig's rotations in radians; 0 if the chain comes from an earlier pass.
+    /// Chain with the prior before any measurement of the run: of the rig, or of another flight.
+    pub(super) fn before_measurements(&self) -> &Self {
+        match self.earlier() {
+            Some(EarlierPrior { measurements: PriorMeasurements::SameFlight, before, .. }) => before,
+            _ => self,
+        }
+    }
+
+    /// Standard deviation of the rig's rotations in radians; 0 if the chain comes from a flight or an earlier pass.
     pub(super) fn rotation_sigma_rad(&self) -> f64 {
         match &self.uncertainty {
             Uncertainty::Rig(sigmas) => sigmas.rotation_rad,

@@ -4,6 +4,7 @@
 
 pub(crate) mod allocation;
 pub(crate) mod calibration;
+pub(crate) mod calibration_posterior;
 pub(crate) mod calibrations;
 pub(crate) mod camera_pose;
 pub(crate) mod camera_view;

@@ -52,12 +52,15 @@ impl Setup {
         (self.config.clock_ms)()
     }
 
-    /// Initial calibration: that of an earlier pass, else that of the rig.
+    /// Initial calibration: that of an earlier pass, else that of earlier flights, else that of the rig.
     pub(crate) fn given_calibration(&self) -> Calibrations {
-        let rig = self.rig_calibration();
+        let mut given = self.rig_calibration();
+        if let Some(prior) = &self.config.calibration_prior {
+            given = given.with_flights(&prior.cameras);
+        }
         match &self.config.earlier_pass {
-            Some(earlier) => rig.with_found(&earlier.cameras),
-            None => rig,
+            Some(earlier) => given.with_found(&earlier.cameras),
+            None => given,
         }
     }
 

@@ -77,6 +77,11 @@ impl<'a> MessageType<'a> {
         Self { name, definition_encoding: "ros2msg", definition, message_encoding: "cdr" }
     }
 
+    /// Video frames of Foxglove in Protocol Buffers.
+    pub(in crate::flight_log) fn compressed_video() -> Self {
+        Self::protobuf(MessageKind::CompressedVideoProtobuf.schema_name(), protobuf::compressed_video_definition())
+    }
+
     /// Message of protobuf with its `FileDescriptorSet`.
     fn protobuf(name: &'a str, definition: Vec<u8>) -> Self {
         Self { name, definition_encoding: "protobuf", definition: Cow::Owned(definition), message_encoding: "protobuf" }
@@ -312,9 +317,7 @@ impl LogWriter {
     ) -> Result<(), LogError> {
         if !self.channels.contains_key(topic) {
             let message_type = match kind {
-                MessageKind::CompressedVideoProtobuf => {
-                    MessageType::protobuf(kind.schema_name(), protobuf::compressed_video_definition())
-                }
+                MessageKind::CompressedVideoProtobuf => MessageType::compressed_video(),
                 kind => MessageType::ros2(kind.schema_name(), schemas::definition(kind)),
             };
             self.add_channel(topic, &message_type)?;

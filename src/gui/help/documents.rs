@@ -18,7 +18,7 @@ macro_rules! document {
 }
 
 /// The manual is first.
-const DOCUMENTS: [Document; 30] = [
+const DOCUMENTS: [Document; 31] = [
     document!("docs/manual.md"),
     document!("docs/tutorial.md"),
     document!("docs/recordings.md"),
@@ -48,6 +48,7 @@ const DOCUMENTS: [Document; 30] = [
     document!("docs/experiments/regression_guard.md"),
     document!("docs/experiments/heading_in_an_orbit.md"),
     document!("docs/experiments/planned_motions.md"),
+    document!("docs/experiments/calibration_over_flights.md"),
     document!("docs/experiments/tried_and_not_used.md"),
 ];
 

@@ -115,6 +115,7 @@ fn recording_of(flight: &SyntheticFlight, runs: &[&str]) -> Recording {
         duration_ns: frame_count * FRAME_PERIOD_NS,
         start_ns: 0,
         epoch_ns: 1_718_451_937_250_000_000,
+        prior: None,
         runs: runs.par_iter().map(|name| run_on(flight, name)).collect(),
         truth_is_batch: false,
         position_truth: None,

@@ -204,6 +204,7 @@ fn recording_of(ranks: &[usize]) -> Recording {
         duration_ns: 1_000_000,
         start_ns: 0,
         epoch_ns: 0,
+        prior: None,
         runs: vec![run],
         truth_is_batch: false,
         position_truth: None,

@@ -8,15 +8,17 @@ use std::sync::{Arc, mpsc};
 use thiserror::Error;
 
 use super::configuration::estimator_config;
+use super::offline_prior::{earlier_flights, with_absolute_shifts};
 use super::tracker::CameraTracker;
 use crate::calibration::{
     self, CalibrationError, CalibrationInput, CalibrationOptions, CalibrationOutcome, CalibrationProgress,
     GimbalCamera, InitialTrajectory, StaticCamera, TrackedView,
 };
+use crate::estimator::CalibrationPosterior;
 use crate::flight_log::{FlightLog, LogError, LogLimits, LogWarning};
 use crate::geometry::{Dimension, RigidTransform, ns_from_seconds, seconds_from_ns};
 use crate::sensors::{CameraMount, CameraRig, ChainPrior, GimbalRig, Rig};
-use crate::session::plan::{ParameterizationChoice, RunSpec, SessionError, check_start};
+use crate::session::plan::{FlightPrior, ParameterizationChoice, RunSpec, SessionError, check_start};
 
 /// Fraction of the progress that feature tracking takes.
 const TRACKING_RATIO: f64 = 0.6;
@@ -52,6 +54,8 @@ pub struct CalibrationRequest {
     pub rig_path: Option<PathBuf>,
     /// Path of the ground-truth rig file; `None` if it is next to the log.
     pub ground_truth_path: Option<PathBuf>,
+    /// Calibration of earlier flights that the calibration starts from.
+    pub prior: Option<Arc<FlightPrior>>,
     /// Seconds to skip at the start of the log.
     pub start_s: f64,
     /// Seconds to read from there, `None` for the rest of the log.
@@ -76,6 +80,10 @@ pub struct CalibrationRun {
     pub gimbal_camera: String,
     /// Estimates, covariances and residuals.
     pub outcome: CalibrationOutcome,
+    /// Calibration of gimbal camera and static camera with their joint covariance, as prior of another flight.
+    pub posterior: CalibrationPosterior,
+    /// Calibration of earlier flights that it started from.
+    pub prior: Option<Arc<FlightPrior>>,
     /// Warnings of the reader about the log.
     pub warnings: Vec<LogWarning>,
 }
@@ -95,7 +103,11 @@ pub fn calibrate(
     let given_rig = Rig::for_log(&log, request.rig_path.as_deref())?;
     let ground_truth_rig = Rig::ground_truth_for_log(&log, request.ground_truth_path.as_deref())?;
     let entries = CalibratedEntries::of(&given_rig, request)?;
-    let (input, trajectory, warnings) = track(&log, &given_rig, &entries, request, on_progress)?;
+    let mounts = (entries.imu_from_camera, &entries.gimbal);
+    let cameras = [&entries.static_camera, &entries.gimbal_camera];
+    let earlier = request.prior.as_ref().map(|prior| earlier_flights(prior, cameras, mounts)).transpose()?;
+    let (mut input, trajectory, warnings) = track(&log, &given_rig, &entries, request, on_progress)?;
+    input.earlier = earlier;
     let outcome = calibration::calibrate_along(&input, trajectory, options, &mut |progress| {
         on_progress(CalibrationProgress {
             fraction: TRACKING_RATIO + (1.0 - TRACKING_RATIO) * progress.fraction,
@@ -107,6 +119,8 @@ pub fn calibrate(
         log_path: request.log_path.clone(),
         epoch_ns: log.epoch_ns(),
         rig: calibrated(&given_rig, &entries, &outcome),
+        posterior: with_absolute_shifts(&outcome.posterior, [&entries.gimbal_camera, &entries.static_camera]),
+        prior: request.prior.clone(),
         static_camera: entries.static_camera.key.clone(),
         gimbal_camera: entries.gimbal_camera.key.clone(),
         given_rig,
@@ -237,6 +251,7 @@ fn track(
         },
         imu_noise: rig.imu.noise,
         gravity_m_per_s2: rig.gravity_m_per_s2,
+        earlier: None,
         estimator,
     };
     Ok((input, trajectory, warnings))

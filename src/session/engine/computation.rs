@@ -78,10 +78,11 @@ impl Computation {
                     run.earlier_pass = Some(progress);
                 }
             }
-            EngineMessage::Finished { run, error } => {
+            EngineMessage::Finished { run, error, posterior } => {
                 if let Some(run) = self.recording_mut().runs.get_mut(run) {
                     run.finished = true;
                     run.error = error;
+                    run.posterior = posterior;
                 }
             }
             EngineMessage::Warnings(warnings) => self.recording_mut().add_warnings(warnings),

@@ -91,7 +91,7 @@ pub fn compute(
 fn ended_at(message: EngineMessage, until_ns: i64) -> EngineMessage {
     match message {
         EngineMessage::Step { run, record } if record.report.stamp_ns > until_ns => {
-            EngineMessage::Finished { run, error: None }
+            EngineMessage::Finished { run, error: None, posterior: None }
         }
         message => message,
     }

@@ -1,3 +1,6 @@
+use std::sync::Arc;
+
+use crate::estimator::CalibrationPosterior;
 use crate::flight_log::LogWarning;
 use crate::session::record::{PassProgress, StepRecord};
 
@@ -19,6 +22,8 @@ pub(in crate::session) enum EngineMessage {
         run: usize,
         /// Reason of an early end, `None` at the end of the log.
         error: Option<String>,
+        /// Calibration at its end, `None` without a window or with a fixed calibration.
+        posterior: Option<Arc<CalibrationPosterior>>,
     },
     Warnings(Vec<LogWarning>),
 }

@@ -17,6 +17,7 @@ mod fork;
 mod history;
 mod image_rotations;
 mod message;
+mod offline_prior;
 mod passes;
 mod planned_flight;
 mod recompute;

@@ -76,7 +76,7 @@ impl RunEngine {
         &mut self.estimator
     }
 
-    pub(super) fn estimator(&self) -> &Estimator {
+    pub(in crate::session) fn estimator(&self) -> &Estimator {
         &self.estimator
     }
 

@@ -19,7 +19,7 @@ use super::step_inputs::OwnedStepInput;
 use super::synchronized_frames::SynchronizedFrames;
 use super::tracker::CameraTracker;
 use crate::estimator::EstimatorConfig;
-use crate::session::plan::{SessionError, SessionPlan, cameras_of_run};
+use crate::session::plan::{RunSpec, SessionError, SessionPlan, cameras_of_run};
 
 /// Capacity in frames of the queue between a tracker and an estimator.
 const FRAME_QUEUE_CAPACITY: usize = 8;
@@ -71,7 +71,7 @@ impl Engine {
                 queues.entry(&camera.key).or_default().push(queue);
                 frames.push((camera.key.clone(), receiver));
             }
-            let config = estimator_config(&plan.rig, spec)?;
+            let config = config_with_prior(plan, spec)?;
             let (passes, keep_linearization_every) = (spec.passes, plan.keep_linearization_every);
             let results = sender.clone();
             let Some(history) = computation.history(run).cloned() else { continue };
@@ -164,6 +164,15 @@ fn track_thread(
     }
 }
 
+/// Configuration of a run that starts from the plan's calibration of earlier flights, if it has one.
+fn config_with_prior(plan: &SessionPlan, spec: &RunSpec) -> Result<EstimatorConfig, SessionError> {
+    let config = estimator_config(&plan.rig, spec)?;
+    let Some(prior) = &plan.prior else { return Ok(config) };
+    let cameras: Vec<&str> = cameras_of_run(&plan.rig, spec)?.iter().map(|camera| camera.key.as_str()).collect();
+    let prior = prior.of_run(&spec.label, &cameras, &plan.rig.joint_names(), &config)?;
+    Ok(EstimatorConfig { calibration_prior: Some(Arc::new(prior)), ..config })
+}
+
 struct RunOverLog {
     run: usize,
     passes: usize,
@@ -202,7 +211,11 @@ impl RunOverLog {
             // The receiver is dropped when the session is closed.
             Err(PassFailure::Closed) => {}
             Err(PassFailure::Failed(reason)) => {
-                drop(self.results.send(EngineMessage::Finished { run: self.run, error: Some(reason) }));
+                drop(self.results.send(EngineMessage::Finished {
+                    run: self.run,
+                    error: Some(reason),
+                    posterior: None,
+                }));
             }
         }
     }
@@ -243,5 +256,6 @@ fn run_steps(
             return;
         }
     }
-    drop(results.send(EngineMessage::Finished { run, error }));
+    let posterior = engine.estimator().posterior().map(Arc::new);
+    drop(results.send(EngineMessage::Finished { run, error, posterior }));
 }

@@ -33,6 +33,9 @@ pub enum SessionError {
         end_s: f64,
         path: PathBuf,
     },
+    /// The posterior of earlier flights belongs to another mechanism.
+    #[error("this prior does not fit {user}: {problem}: {}", folder.display())]
+    Prior { user: String, problem: String, folder: PathBuf },
     #[error("no motion can be planned for the run '{run}': {problem}")]
     Unplannable { run: String, problem: String },
     #[error("cannot start a thread: {source}")]

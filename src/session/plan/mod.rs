@@ -2,6 +2,7 @@
 
 mod correction;
 mod error;
+mod flight_prior;
 mod fork_changes;
 mod fork_text;
 mod run_options;
@@ -14,6 +15,7 @@ mod tuning;
 pub(in crate::session) use correction::LONGEST_SHIFT_S;
 pub use correction::{ImageFlip, ImageHalf, MeasurementCorrection};
 pub use error::SessionError;
+pub use flight_prior::{FlightPrior, FlightSigmas};
 pub use fork_changes::{FORK_PARAMETERIZATIONS, ForkChanges, ForkError};
 pub use run_spec::{MAX_RUNS, ParameterizationChoice, RunSpec, RunSpecError};
 pub(in crate::session) use run_spec::{distinct_label, distinct_labels};

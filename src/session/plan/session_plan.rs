@@ -7,6 +7,7 @@ use std::sync::atomic::AtomicBool;
 
 use super::distinct_labels;
 use super::error::SessionError;
+use super::flight_prior::FlightPrior;
 use super::run_spec::{MAX_RUNS, ParameterizationChoice, RunSpec};
 use super::trajectories::{self, LoadedPositions, LoadedTrajectory, LoadedTruth};
 use super::trajectory_spec::{TrajectorySource, TrajectorySpec};
@@ -35,6 +36,8 @@ pub struct SessionRequest {
     pub truth_trajectory: Option<TrajectorySource>,
     /// Lever arm of the antenna whose positions are the ground truth, instead of the rig's `ground_truth.lever_arm`.
     pub lever_arm: Option<LeverArm>,
+    /// Calibration of earlier flights that the runs start from.
+    pub prior: Option<Arc<FlightPrior>>,
     /// Seconds to skip at the start of the log.
     pub start_s: f64,
     /// Seconds to read from there, `None` for the rest of the log.
@@ -58,6 +61,8 @@ pub struct SessionPlan {
     pub rig: Arc<Rig>,
     /// The ground-truth rig, if known.
     pub ground_truth_rig: Option<Arc<Rig>>,
+    /// Calibration of earlier flights that the runs start from.
+    pub prior: Option<Arc<FlightPrior>>,
     /// The runs, each with the key of its main camera.
     pub runs: Vec<(RunSpec, String)>,
     /// Trajectories of other programs, shown with the runs.
@@ -135,6 +140,7 @@ impl SessionPlan {
             ground_truth_path: request.ground_truth_path.clone(),
             rig: Arc::new(rig),
             ground_truth_rig: ground_truth_rig.map(Arc::new),
+            prior: request.prior.clone(),
             runs,
             start_s: request.start_s,
             duration_s: request.duration_s,

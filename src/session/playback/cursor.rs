@@ -266,6 +266,7 @@ mod tests {
                 duration_ns: 4_000_000_000,
                 start_ns: 0,
                 epoch_ns: 0,
+                prior: None,
                 runs: vec![run],
                 truth_is_batch: false,
                 position_truth: None,

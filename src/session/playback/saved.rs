@@ -134,6 +134,7 @@ impl SavedSession {
             rig_path: self.rig.clone(),
             ground_truth_path: self.ground_truth.clone(),
             specs: specs.map_err(entry_error)?,
+            prior: None,
             trajectories: trajectories.map_err(entry_error)?,
             start_s: self.start_s,
             duration_s: self.duration_s,

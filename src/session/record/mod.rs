@@ -1,6 +1,7 @@
 //! Stored reports of every step of every run, and values derived from them without running an estimator.
 
 mod antenna_record;
+mod collected_information;
 mod comparison;
 mod flight_parameter;
 mod flight_table;
@@ -25,6 +26,7 @@ mod warning_lines;
 mod warnings;
 
 pub use antenna_record::PositionTruth;
+pub use collected_information::CollectedInformation;
 pub use comparison::{ComparedQuantity, Comparison, Divergence};
 pub use flight_parameter::FlightParameter;
 pub use flight_table::{flight_headline, flight_table, least_determined};

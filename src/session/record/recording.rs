@@ -9,7 +9,7 @@ use crate::flight_log::{LogWarning, WarningKind};
 use crate::geometry::ns_from_seconds;
 use crate::gimbal::ParameterId;
 use crate::sensors::Rig;
-use crate::session::plan::{LoadedTrajectory, RunSpec, SessionPlan, chain_parameters};
+use crate::session::plan::{FlightPrior, LoadedTrajectory, RunSpec, SessionPlan, chain_parameters};
 
 /// Reports of all runs on one log so far.
 #[derive(Clone, Debug)]
@@ -24,6 +24,8 @@ pub struct Recording {
     pub start_ns: i64,
     /// Header stamp of the log's start, in nanoseconds since the Unix epoch.
     pub epoch_ns: i64,
+    /// Calibration of earlier flights that the runs started from.
+    pub prior: Option<Arc<FlightPrior>>,
     /// The runs in the order of the request; added runs and forks follow.
     pub runs: Vec<RunRecord>,
     /// True if the ground truth of the trajectory is the reference of an offline calibration of the same log.
@@ -79,6 +81,7 @@ impl Recording {
             duration_ns: plan.log.duration_ns(),
             start_ns: ns_from_seconds(plan.start_s),
             epoch_ns: plan.log.epoch_ns(),
+            prior: plan.prior.clone(),
             runs: plan.runs.iter().map(|(spec, camera_key)| run(spec, camera_key)).collect(),
             truth_is_batch: plan.truth_is_batch,
             position_truth: position_truth.clone(),

@@ -10,6 +10,7 @@ use super::solver_trace::SolverTrace;
 use super::step::{StepFactorRows, StepRecord};
 use super::summary::SummaryOrder;
 use super::warnings::{RunWarning, add_warnings, warnings_of};
+use crate::estimator::CalibrationPosterior;
 use crate::geometry::RigidTransform;
 use crate::session::accuracy::{AlignmentSums, TrajectoryAlignment};
 use crate::session::plan::{ForkChanges, RunSpec};
@@ -67,6 +68,8 @@ pub struct RunRecord {
     pub earlier_pass: Option<PassProgress>,
     /// Reason of an early end.
     pub error: Option<String>,
+    /// Calibration at the end of the run, as prior of another flight; `None` before the end, and without a window then.
+    pub posterior: Option<Arc<CalibrationPosterior>>,
     /// `true_from_estimate`: the yaw rotation and translation that align the estimated trajectory with the ground
     /// truth, `None` with too few frames.
     pub alignment: Option<RigidTransform>,
@@ -105,6 +108,7 @@ impl RunRecord {
             finished: false,
             earlier_pass: None,
             error: None,
+            posterior: None,
             alignment: None,
             alignment_sums: AlignmentSums::default(),
             position_truth: None,

@@ -1,6 +1,7 @@
 mod accuracy;
 mod covariance;
 mod diagnosis;
+mod flight_prior;
 mod forks;
 pub(crate) mod memory;
 mod passes;
