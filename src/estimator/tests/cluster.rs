@@ -1,5 +1,7 @@
 //! A gimballed and a rigid camera in one window.
 
+use rayon::prelude::*;
+
 use super::fixture;
 use super::flight::{chain_error, run_flight, trajectory_error_m};
 use crate::estimator::config::{EstimatorConfig, EstimatorOptions};
@@ -66,31 +68,47 @@ fn both(_: usize) -> [bool; 2] {
     [true, true]
 }
 
-#[test]
-fn two_cameras_are_more_accurate_than_one_with_a_wrong_chain() {
-    let (mut cluster_m, mut gimbal_m, mut rigid_m) = (0.0, 0.0, 0.0);
-    let (mut cluster_rad, mut gimbal_rad) = (0.0, 0.0);
-    for seed in 1..=6 {
+/// Position errors in metres and chain errors in radians.
+struct Errors {
+    cluster_m: f64,
+    gimbal_m: f64,
+    rigid_m: f64,
+    cluster_rad: f64,
+    gimbal_rad: f64,
+}
+
+impl Errors {
+    /// Errors of a flight with both cameras and with each of them alone.
+    fn of(seed: u64) -> Self {
         let flights = BothFlights::new(seed, 14.0);
         let config = flights.config();
         let given = chain_error(&flights.gimbal, &Estimator::new(config.clone()));
         assert!(given.1 > 5.0_f64.to_radians(), "seed {seed}: the chain is given wrong by {} rad", given.1);
         let alone = EstimatorConfig { rigid_cameras: Vec::new(), ..config.clone() };
         let (estimator, reports) = run_flight(&flights.gimbal.frames, alone);
-        gimbal_m += trajectory_error_m(&flights.gimbal.frames, &reports).0;
-        gimbal_rad += chain_error(&flights.gimbal, &estimator).1;
+        let gimbal_m = trajectory_error_m(&flights.gimbal.frames, &reports).0;
+        let gimbal_rad = chain_error(&flights.gimbal, &estimator).1;
         let alone = fixture::config(&flights.rigid.given_rig, Parameterization::Minimal, EstimatorOptions::default());
         let (_, reports) = run_flight(&flights.rigid.frames, alone);
-        rigid_m += trajectory_error_m(&flights.rigid.frames, &reports).0;
+        let rigid_m = trajectory_error_m(&flights.rigid.frames, &reports).0;
         let (estimator, reports) = flights.run_flight(config, both);
         assert_eq!(estimator.restarts, 0, "seed {seed}");
-        cluster_m += trajectory_error_m(&flights.gimbal.frames, &reports).0;
-        cluster_rad += chain_error(&flights.gimbal, &estimator).1;
+        let cluster_m = trajectory_error_m(&flights.gimbal.frames, &reports).0;
+        Self { cluster_m, gimbal_m, rigid_m, cluster_rad: chain_error(&flights.gimbal, &estimator).1, gimbal_rad }
     }
+}
+
+#[test]
+fn two_cameras_are_more_accurate_than_one_with_a_wrong_chain() {
+    let errors: Vec<Errors> = (1_u64..=6).into_par_iter().map(Errors::of).collect();
+    let sum = |part: fn(&Errors) -> f64| errors.iter().map(part).sum::<f64>();
+    let cluster_m = sum(|errors| errors.cluster_m);
+    let (gimbal_m, rigid_m) = (sum(|errors| errors.gimbal_m), sum(|errors| errors.rigid_m));
     assert!(
         cluster_m < gimbal_m && cluster_m < rigid_m,
         "{cluster_m} m with both, {gimbal_m} m with the gimballed one, {rigid_m} m with the rigid one"
     );
+    let (cluster_rad, gimbal_rad) = (sum(|errors| errors.cluster_rad), sum(|errors| errors.gimbal_rad));
     assert!(cluster_rad < 1.1 * gimbal_rad, "{cluster_rad} rad with both, {gimbal_rad} rad with the gimballed one");
 }
 

@@ -1,6 +1,7 @@
 //! Flights with faults: missing encoders and images, a saturated IMU.
 
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 
 use super::fixture::{self, TestWindow};
 use super::flight::{chain_error, run_flight, step, trajectory_error_m};
@@ -291,7 +292,8 @@ fn far_off(seed: u64, duration_s: f64) -> SyntheticFlight {
 #[test]
 fn the_window_converges_from_poor_initial_values() {
     let errors_m = |options: EstimatorOptions| -> Vec<f64> {
-        (1..=3)
+        (1_u64..=3)
+            .into_par_iter()
             .map(|seed| {
                 let flight = far_off(seed, 20.0);
                 let config = fixture::config(&flight.given_rig, Parameterization::Minimal, options);

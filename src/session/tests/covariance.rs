@@ -1,5 +1,7 @@
 //! Covariances of poses: against the window's rows, and against the errors of many flights.
 
+use rayon::prelude::*;
+
 use super::memory::{recorded, recorded_with};
 use crate::estimator::{ColumnGroup, Linearization};
 use crate::session::record::PoseError;
@@ -36,15 +38,15 @@ fn covariances_are_those_of_the_rows_of_the_window() {
 
 #[test]
 fn errors_agree_with_covariances_that_grow_from_the_first_frame_on() {
-    let mut nees = Vec::new();
-    for seed in 1..=6 {
+    let nees_of = |seed| {
         let flight = synthetic_tracks(&SyntheticOptions { seed, duration_s: 10.0, ..SyntheticOptions::default() });
         let errors = recorded(&flight, "auto").pose_errors();
         let [first, last] = [errors.first(), errors.last()].map(|error| error.unwrap().covariance);
         assert!(first.position_sigma_m() < 0.03, "{} m", first.position_sigma_m());
         assert!(last.position_sigma_m() > first.position_sigma_m());
-        nees.push(PoseError::mean_nees(&errors).unwrap());
-    }
+        PoseError::mean_nees(&errors).unwrap()
+    };
+    let nees: Vec<f64> = (1_u64..=6).into_par_iter().map(nees_of).collect();
     // Errors of one flight are correlated in time: the six flights count as about six samples of six components.
     let mean = nees.iter().sum::<f64>() / nees.len() as f64;
     assert!((3.0..10.0).contains(&mean), "NEES {mean}: {nees:?}");

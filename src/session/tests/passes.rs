@@ -3,6 +3,8 @@
 use std::sync::Arc;
 use std::sync::mpsc::sync_channel;
 
+use rayon::prelude::*;
+
 use super::memory::input_of;
 use crate::estimator::Phase;
 use crate::session::engine::{EarlierPasses, EngineMessage, OwnedStepInput, RunEngine, estimator_config};
@@ -45,20 +47,21 @@ fn first_tilt_rad(run: &RunRecord) -> f64 {
 
 #[test]
 fn a_second_pass_starts_upright_and_follows_the_truth_more_closely() {
-    let (mut tilts, mut errors, mut nees) = ([0.0_f64; 2], [0.0_f64; 2], 0.0);
     const SEEDS: std::ops::RangeInclusive<u64> = 1..=3;
-    for seed in SEEDS {
+    let of_seed = |seed| {
         let start_error = RULER;
         let options = SyntheticOptions { seed, duration_s: 10.0, start_error, ..SyntheticOptions::default() };
         let flight = synthetic_tracks(&options);
-        for (place, spec) in ["auto", "auto:passes=2"].into_iter().enumerate() {
-            let (run, _) = recorded_in_passes(&flight, spec);
-            tilts[place] += first_tilt_rad(&run);
+        ["auto", "auto:passes=2"].map(|spec| recorded_in_passes(&flight, spec).0)
+    };
+    let runs: Vec<[RunRecord; 2]> = SEEDS.into_par_iter().map(of_seed).collect();
+    let (mut tilts, mut errors, mut nees) = ([0.0_f64; 2], [0.0_f64; 2], 0.0);
+    for [one, two] in &runs {
+        for (place, run) in [one, two].into_iter().enumerate() {
+            tilts[place] += first_tilt_rad(run);
             errors[place] += run.accuracy().expect("there is ground truth").ate_rmse_m.ln();
-            if place == 1 {
-                nees += PoseError::mean_nees(&run.pose_errors()).unwrap();
-            }
         }
+        nees += PoseError::mean_nees(&two.pose_errors()).unwrap();
     }
     let count = SEEDS.count() as f64;
     let ratio = ((errors[1] - errors[0]) / count).exp();

@@ -225,6 +225,8 @@ fn write_database(log: &Path, database: &Path, change: impl Fn(&[u8]) -> Vec<u8>
     // In reverse order: the messages are sorted by time, not by row.
     let mut messages: Vec<_> = messages.collect();
     messages.reverse();
+    // One transaction: each would wait for the disk.
+    let database = database.unchecked_transaction().expect("a transaction can begin");
     for message in messages {
         let schema = message.channel.schema.as_ref().expect("every topic has a type");
         let topic = (i64::from(message.channel.id), &message.channel.topic, &schema.name);
@@ -234,6 +236,7 @@ fn write_database(log: &Path, database: &Path, change: impl Fn(&[u8]) -> Vec<u8>
         let insert = "INSERT INTO messages (topic_id, timestamp, data) VALUES (?1, ?2, ?3)";
         database.execute(insert, row).expect("a message can be added");
     }
+    database.commit().expect("the rows can be written");
 }
 
 fn write_metadata(bag: &Path, file: &str, mode: &str, format: &str) {
