@@ -10,6 +10,12 @@ use dcvins::flight_log::output;
 
 use crate::cli::terminal::print;
 
+/// Date of the release in the headers of manual pages, that of the changelog.
+const RELEASED: &str = "2026-11-27";
+
+/// Name and version in the footers of manual pages.
+const SOURCE: &str = concat!("dcvins ", env!("CARGO_PKG_VERSION"));
+
 #[derive(Args, Clone, Debug)]
 pub(crate) struct GenerateArguments {
     /// Kind of the files.
@@ -74,7 +80,7 @@ fn manual_pages(command: &Command) -> Result<Vec<(String, Vec<u8>)>> {
     let mut waiting: Vec<Command> = command.get_subcommands().cloned().collect();
     while let Some(command) = waiting.pop() {
         waiting.extend(command.get_subcommands().filter(|it| it.get_name() != "help").cloned());
-        let man = Man::new(command).section("1").source("dcvins").manual("User commands");
+        let man = Man::new(command).section("1").date(RELEASED).source(SOURCE).manual("User commands");
         let mut page = Vec::new();
         man.render(&mut page).context("cannot write a manual page")?;
         pages.push((man.get_filename(), page));

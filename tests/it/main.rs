@@ -21,6 +21,7 @@ mod plan;
 mod python;
 #[cfg(feature = "gui")]
 mod renderers;
+mod release;
 mod report;
 mod result_cache;
 mod results;
