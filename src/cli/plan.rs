@@ -9,6 +9,7 @@ use dcvins::export::{self, PlanReport, PlannedFlight};
 use dcvins::gimbal::ParameterId;
 use dcvins::observability::laboratory::{
     MotionLimits, MotionPlanError, PLAN_DURATION_S, PlanCriterion, PlanOptions, Situation, plan_by_hand, plan_motion,
+    scene_distances_m,
 };
 use dcvins::sensors::Rig;
 use dcvins::session::{self, RunSpec};
@@ -17,9 +18,6 @@ use crate::cli::exit::ExitOutcome;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::terminal::{Progress, notify, print_report};
 use crate::cli::value_parsers::within;
-
-/// Distances of the scene between the nearest and the farthest one, in equal ratios.
-const DISTANCES: usize = 7;
 
 #[derive(Args, Clone, Debug)]
 pub(crate) struct PlanArguments {
@@ -142,7 +140,7 @@ fn distance(text: &str) -> Result<Distance, String> {
 pub(crate) fn plan(arguments: &PlanArguments) -> Result<ExitOutcome> {
     let rig = Rig::from_file(&arguments.rig)?;
     export::check_plan_folder(&arguments.out, &rig.name, arguments.force)?;
-    let situation = session::situation_before_flight(&rig, &arguments.run, arguments.distances_m())?;
+    let situation = session::situation_before_flight(&rig, &arguments.run, scene_distances_m(arguments.distance.0))?;
     let options = arguments.options(&situation)?;
     let interrupt = Interrupt::watch()?;
     let progress = Progress::new();
@@ -185,19 +183,7 @@ pub(crate) fn plan(arguments: &PlanArguments) -> Result<ExitOutcome> {
 }
 
 impl PlanArguments {
-    fn distances_m(&self) -> Vec<f64> {
-        let [near_m, far_m] = self.distance.0;
-        let ratio = |index: usize| index as f64 / (DISTANCES - 1) as f64;
-        (0..DISTANCES).map(|index| near_m * (far_m / near_m).powf(ratio(index))).collect()
-    }
-
     fn options(&self, situation: &Situation) -> Result<PlanOptions> {
-        let range_rad = self.joint_range_deg.to_radians();
-        let joints = situation.joints.iter().zip(&situation.joints_rad);
-        let ranges = joints.map(|(joint, middle_rad)| {
-            let (low, high) = joint.limits_rad;
-            (low.max(middle_rad - range_rad), high.min(middle_rad + range_rad))
-        });
         let limits = MotionLimits {
             joint_rate_rad_per_s: self.joint_rate_deg.to_radians(),
             joint_acceleration_rad_per_s2: self.joint_acceleration_deg.to_radians(),
@@ -206,7 +192,7 @@ impl PlanArguments {
             reach_m: self.reach.0.into(),
             heading_rad: self.heading_deg.to_radians(),
             heading_rate_rad_per_s: self.heading_rate_deg.to_radians(),
-            ..MotionLimits::slow(ranges.collect())
+            ..MotionLimits::slow_around(situation, self.joint_range_deg.to_radians())
         };
         Ok(PlanOptions {
             duration_s: self.duration,

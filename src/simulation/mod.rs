@@ -19,6 +19,7 @@ mod gimbal_imu;
 mod imu;
 mod interval;
 mod motion;
+mod motion_samples;
 #[cfg(feature = "logs")]
 mod options;
 #[cfg(feature = "logs")]
@@ -49,7 +50,8 @@ pub use exercise::{Exercise, JOINT_PERIOD_S, JointSwing, ROCK_M, ROCK_PERIOD_S, 
 pub use experiment::{Environment, Experiment, WorldKind};
 pub use gimbal::JointMotion;
 pub use imu::SimulatedBias;
-pub use motion::{MotionSample, MotionSplines, PrescribedMotion};
+pub use motion::MotionSplines;
+pub use motion_samples::{MotionSample, PrescribedMotion};
 #[cfg(feature = "logs")]
 pub use options::{SimulationOptions, SimulationProgress, SimulationSummary};
 #[cfg(feature = "logs")]

@@ -1,36 +1,18 @@
-//! Prescribed motions of vehicle and joints: samples over time, and the splines through them.
+//! Prescribed motions of vehicle and joints as splines.
 
 use std::ops::Range;
 
 use nalgebra::{Vector1, Vector3};
 
+use super::motion_samples::{MotionSample, PrescribedMotion};
 use super::spline::Spline;
 use super::trajectory::Trajectory;
-
-/// Vehicle and joints at one time of a prescribed motion.
-#[derive(Clone, Debug, PartialEq)]
-pub struct MotionSample {
-    pub time_s: f64,
-    /// One angle per joint.
-    pub joints_rad: Vec<f64>,
-    /// Position of the IMU: forward, left and up at heading zero.
-    pub position_m: Vector3<f64>,
-    /// Rotation about the vertical, positive to the left.
-    pub heading_rad: f64,
-}
-
-/// Samples of a motion in time order, as a file holds them.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PrescribedMotion {
-    pub joint_names: Vec<String>,
-    pub samples: Vec<MotionSample>,
-}
 
 /// Motion of joints and vehicle as one uniform quintic B-spline per channel: the joints, then forward, left, up in
 /// metres, then the heading.
 ///
 /// The vehicle starts and ends at rest where the control values at the ends are equal ([`Self::free_points`]).
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct MotionSplines {
     channels: Vec<Spline<1>>,
     duration_s: f64,
@@ -42,6 +24,8 @@ const VEHICLE_CHANNELS: usize = 4;
 const REST_POINTS: usize = 5;
 /// Index of the control value with the largest weight at the start.
 const CENTRE: usize = 2;
+/// Knots on either side of its time on which a control value has an effect.
+const POINT_REACH: f64 = 3.0;
 /// Weights of five neighbouring control values at a knot, times [`KNOT_SUM`].
 const KNOT_WEIGHTS: [f64; 3] = [66.0, 26.0, 1.0];
 const KNOT_SUM: f64 = 120.0;
@@ -49,75 +33,6 @@ const KNOT_SUM: f64 = 120.0;
 const ROUNDS: usize = 150;
 /// Shortest distance of the knots of a spline through samples, in seconds.
 const MIN_KNOT_S: f64 = 0.1;
-/// Longest motion that is accepted, in seconds.
-const MAX_DURATION_S: f64 = 3600.0;
-/// Longest time between two samples, in seconds.
-const MAX_GAP_S: f64 = 2.0;
-/// Largest distance from the start, in metres, and largest angle, in radians.
-const MAX_VALUE: f64 = 1000.0;
-
-impl PrescribedMotion {
-    /// Time from the first sample to the last.
-    pub fn duration_s(&self) -> f64 {
-        match (self.samples.first(), self.samples.last()) {
-            (Some(first), Some(last)) => last.time_s - first.time_s,
-            _ => 0.0,
-        }
-    }
-
-    /// Checks times and values.
-    ///
-    /// # Errors
-    /// The first problem as a sentence, with its time.
-    pub fn check(&self) -> Result<(), String> {
-        let duration_s = self.duration_s();
-        if !(0.5..=MAX_DURATION_S).contains(&duration_s) {
-            return Err(format!("the motion lasts {duration_s:.3} s: expected 0.5 to {MAX_DURATION_S} s"));
-        }
-        for pair in self.samples.windows(2) {
-            let (from_s, to_s) = (pair[0].time_s, pair[1].time_s);
-            if to_s <= from_s || to_s - from_s > MAX_GAP_S {
-                return Err(format!(
-                    "the time after {from_s:.3} s is {to_s:.3} s: expected a later one, at most {MAX_GAP_S} s later"
-                ));
-            }
-        }
-        for sample in &self.samples {
-            if sample.joints_rad.len() != self.joint_names.len() {
-                return Err(format!("the sample at {:.3} s has another number of joints", sample.time_s));
-            }
-            let values = sample.joints_rad.iter().chain(sample.position_m.iter()).chain([&sample.heading_rad]);
-            if let Some(value) = values.copied().find(|value| value.is_nan() || value.abs() > MAX_VALUE) {
-                return Err(format!(
-                    "a value at {:.3} s is {value}: expected −{MAX_VALUE} to {MAX_VALUE}",
-                    sample.time_s
-                ));
-            }
-        }
-        Ok(())
-    }
-
-    /// Value of a channel at a time since the first sample, by linear interpolation.
-    fn value(&self, channel: usize, since_s: f64) -> f64 {
-        let time_s = self.samples[0].time_s + since_s;
-        let after = self.samples.partition_point(|sample| sample.time_s < time_s).clamp(1, self.samples.len() - 1);
-        let (from, to) = (&self.samples[after - 1], &self.samples[after]);
-        let ratio = ((time_s - from.time_s) / (to.time_s - from.time_s)).clamp(0.0, 1.0);
-        let (first, second) = (from.channel(channel), to.channel(channel));
-        first + (second - first) * ratio
-    }
-}
-
-impl MotionSample {
-    fn channel(&self, channel: usize) -> f64 {
-        let joints = self.joints_rad.len();
-        match channel.checked_sub(joints) {
-            None => self.joints_rad[channel],
-            Some(axis @ 0..3) => self.position_m[axis],
-            Some(_) => self.heading_rad,
-        }
-    }
-}
 
 impl MotionSplines {
     /// Vehicle at rest at the origin with heading zero and these joint angles, in `intervals` knot intervals.
@@ -132,10 +47,16 @@ impl MotionSplines {
     /// Interpolates samples that pass [`PrescribedMotion::check`]: at its knots, 0.1 s or the samples' median distance
     /// apart, the motion equals the samples, interpolated linearly between them.
     pub fn through(motion: &PrescribedMotion) -> Self {
-        let duration_s = motion.duration_s();
         let mut gaps_s: Vec<f64> = motion.samples.windows(2).map(|pair| pair[1].time_s - pair[0].time_s).collect();
         gaps_s.sort_by(f64::total_cmp);
         let knot_s = gaps_s.get(gaps_s.len() / 2).map_or(MIN_KNOT_S, |gap_s| gap_s.max(MIN_KNOT_S));
+        Self::with_knots(motion, knot_s)
+    }
+
+    /// Interpolates samples that pass [`PrescribedMotion::check`] at knots about `knot_s` seconds apart; between them the
+    /// motion is smoother than the samples.
+    pub fn with_knots(motion: &PrescribedMotion, knot_s: f64) -> Self {
+        let duration_s = motion.duration_s();
         let intervals = (duration_s / knot_s).round().max(1.0) as usize;
         let mut splines = Self::at_rest(&motion.samples[0].joints_rad, duration_s, intervals);
         for channel in 0..splines.channels.len() {
@@ -165,6 +86,11 @@ impl MotionSplines {
         REST_POINTS..(count - REST_POINTS - CENTRE).max(REST_POINTS)
     }
 
+    /// Number of control values of a channel.
+    pub fn point_count(&self) -> usize {
+        self.channels[0].points.len()
+    }
+
     pub fn point(&self, channel: usize, index: usize) -> f64 {
         self.channels[channel].points[index].x
     }
@@ -176,6 +102,17 @@ impl MotionSplines {
     /// Time in seconds at which a control value has its largest weight.
     pub fn time_of_point(&self, index: usize) -> f64 {
         self.channels[0].time_of_point(index)
+    }
+
+    /// Times in seconds between which a control value has an effect.
+    pub fn reach_of_point_s(&self, index: usize) -> [f64; 2] {
+        let half_s = POINT_REACH * self.knot_s();
+        [self.time_of_point(index) - half_s, self.time_of_point(index) + half_s]
+    }
+
+    /// Change of a channel per change of a control value, `distance` knots from the control value's time.
+    pub fn weight_at_knot(distance: usize) -> f64 {
+        KNOT_WEIGHTS.get(distance).map_or(0.0, |weight| weight / KNOT_SUM)
     }
 
     /// Time between two knots, in seconds.
@@ -285,25 +222,6 @@ mod tests {
                 }
             }
         }
-    }
-
-    #[test]
-    fn motions_that_cannot_be_flown_are_rejected_with_their_place() {
-        let splines = wave(1, 4.0, 10);
-        let samples: Vec<MotionSample> = (0..=40).map(|step| splines.sample(0.1 * f64::from(step))).collect();
-        let motion = PrescribedMotion { joint_names: vec!["pan".to_owned()], samples };
-        let check = |change: fn(&mut PrescribedMotion), words: &str| {
-            let mut changed = motion.clone();
-            change(&mut changed);
-            let problem = changed.check().unwrap_err();
-            assert!(problem.contains(words), "{problem}");
-        };
-        check(|motion| motion.samples.truncate(2), "lasts 0.100 s");
-        check(|motion| motion.samples[7].time_s = 0.2, "after 0.600 s is 0.200 s");
-        check(|motion| motion.samples[3].heading_rad = f64::NAN, "at 0.300 s is NaN");
-        check(|motion| motion.samples[3].position_m.y = 1e9, "at 0.300 s");
-        check(|motion| motion.samples[5].joints_rad.clear(), "number of joints");
-        check(|motion| motion.samples.clear(), "lasts 0.000 s");
     }
 
     #[test]

@@ -4,7 +4,7 @@ use super::disturbances::Disturbances;
 use super::equipment::Lens;
 use super::error::SimulationError;
 use super::experiment::{Experiment, WorldKind};
-use super::motion::PrescribedMotion;
+use super::motion_samples::PrescribedMotion;
 use crate::sensors::ChainPrior;
 
 /// Flight and sensors of a simulation; [`SimulationOptions::new`] gives an experiment of the paper.

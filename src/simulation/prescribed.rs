@@ -2,7 +2,8 @@
 
 use super::error::SimulationError;
 use super::gimbal::JointMotion;
-use super::motion::{MotionSplines, PrescribedMotion};
+use super::motion::MotionSplines;
+use super::motion_samples::PrescribedMotion;
 use super::options::SimulationOptions;
 use super::route::FlightPoint;
 use super::scenario::{Scenario, gravity_m_per_s2};

@@ -7,7 +7,7 @@ const DEGREE: usize = 5;
 ///
 /// Control point `c` has its largest weight at the time `(c − 2) · knot_s`; equal control points give an exact
 /// standstill.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Spline<const D: usize> {
     pub(crate) knot_s: f64,
     pub(crate) points: Vec<SVector<f64, D>>,

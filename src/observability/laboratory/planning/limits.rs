@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 use serde::Serialize;
 
+use super::super::Situation;
 use crate::simulation::MotionSplines;
 
 /// Limits of joints and vehicle.
@@ -38,6 +39,16 @@ impl MotionLimits {
         }
     }
 
+    /// The same for the joints of a situation, `range_rad` to either side of their start angles within their stops.
+    pub fn slow_around(situation: &Situation, range_rad: f64) -> Self {
+        let joints = situation.joints.iter().zip(&situation.joints_rad);
+        let ranges = joints.map(|(joint, start_rad)| {
+            let (low, high) = joint.limits_rad;
+            (low.max(start_rad - range_rad), high.min(start_rad + range_rad))
+        });
+        Self::slow(ranges.collect())
+    }
+
     /// These limits, lower by a ratio except the ranges, as a margin for a check at other times.
     pub(super) fn reduced(&self, ratio: f64) -> Self {
         Self {
@@ -52,7 +63,7 @@ impl MotionLimits {
     }
 
     /// Smallest and largest control value of a channel. A spline stays within the range of its control values.
-    pub(super) fn range(&self, channel: usize) -> (f64, f64) {
+    pub fn range(&self, channel: usize) -> (f64, f64) {
         match channel.checked_sub(self.joints_rad.len()) {
             None => self.joints_rad[channel],
             Some(axis @ 0..3) => (-self.reach_m[axis], self.reach_m[axis]),
@@ -63,10 +74,14 @@ impl MotionLimits {
     /// Largest excess of a motion over the limits of a channel's rate and acceleration between two times, as a ratio: at
     /// most 1 within the limits. The three channels of the position are one.
     pub(super) fn load(&self, motion: &MotionSplines, channel: usize, [from_s, to_s]: [f64; 2], step_s: f64) -> f64 {
-        let joints = self.joints_rad.len();
         let steps = ((to_s - from_s) / step_s).ceil().max(1.0) as usize;
         let times_s = (0..=steps).map(|step| (from_s + step as f64 * step_s).min(to_s));
-        let of = |time_s: f64| match channel.checked_sub(joints) {
+        times_s.map(|time_s| self.load_at(motion, channel, time_s)).fold(0.0, f64::max)
+    }
+
+    /// Rate and acceleration of a channel at a time, as the larger ratio to their limits.
+    pub fn load_at(&self, motion: &MotionSplines, channel: usize, time_s: f64) -> f64 {
+        match channel.checked_sub(self.joints_rad.len()) {
             None => {
                 let [rate, acceleration] = [1, 2].map(|order| motion.value(channel, time_s, order).abs());
                 (rate / self.joint_rate_rad_per_s).max(acceleration / self.joint_acceleration_rad_per_s2)
@@ -79,8 +94,7 @@ impl MotionLimits {
                 let [rate, acceleration] = [1, 2].map(|order| motion.heading_rad(time_s, order).abs());
                 (rate / self.heading_rate_rad_per_s).max(acceleration / self.heading_acceleration_rad_per_s2)
             }
-        };
-        times_s.map(of).fold(0.0, f64::max)
+        }
     }
 
     /// Limits with the largest values that a motion reaches, at steps of 0.01 s.

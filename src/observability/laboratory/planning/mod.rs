@@ -5,10 +5,12 @@
 //! ([`super::advise`]). The search adds bumps to the splines within the limits of joints and vehicle.
 
 mod by_hand;
+mod edit;
 mod limits;
 mod moves;
 mod objective;
 mod plan;
+mod problem;
 mod search;
 mod starts;
 mod summary;
@@ -17,10 +19,13 @@ mod tests;
 mod windows;
 
 pub use by_hand::{HandPlan, HandStep};
+pub use edit::move_point;
 pub use limits::{MotionLimits, ReachedLimit};
 pub use objective::PlanCriterion;
 pub use plan::{
     ListedComparison, MotionPlan, MotionPlanError, PLAN_DURATION_S, PlanOptions, PlanStart, plan_by_hand, plan_motion,
 };
+pub use problem::{MotionPrediction, MotionPredictor, MotionProblem, MotionStart};
+pub use starts::PLAN_KNOT_S;
 pub use summary::{PlanTable, PlannedParameter, SigmaRow};
-pub use windows::PLAN_FRAME_PERIOD_S;
+pub use windows::{PLAN_FRAME_PERIOD_S, scene_distances_m};

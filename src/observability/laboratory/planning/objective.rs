@@ -21,14 +21,20 @@ const EXPONENT: i32 = 8;
 /// A parameter whose prior σ within the observable directions is less than this, in column units, is redundant.
 const REDUNDANT: f64 = 1e-6;
 
+/// Smallest part of a parameter's squared unit vector along directions that the parameterization has twice, from which
+/// the parameter is redundant.
+const REDUNDANT_PART: f64 = 0.25;
+
 /// Criterion with the prior of the calibration.
 #[derive(Clone, Debug)]
 pub(super) struct Objective {
     criterion: PlanCriterion,
     /// Orthonormal directions that some motion makes observable (n × k).
     excitable: DMatrix<f64>,
-    /// Prior information along them (k × k).
-    prior: DMatrix<f64>,
+    /// True for each column that the parameterization has twice.
+    redundant: Vec<bool>,
+    /// Information along the observable directions before the motion (k × k): of the prior, or of an earlier flight too.
+    start: DMatrix<f64>,
     /// Prior σ of every column within these directions, in column units.
     prior_sigmas: Vec<f64>,
     /// Columns of the criterion.
@@ -42,11 +48,12 @@ impl Objective {
     /// them observable or a number is not finite.
     pub(super) fn new(situation: &Situation, criterion: PlanCriterion, chosen: &[ParameterId]) -> Option<Self> {
         let excitable = excitable_directions(&situation.chain, situation.joints_free());
-        let prior = excitable.tr_mul(&(&situation.information * &excitable));
+        let start = excitable.tr_mul(&(&situation.information * &excitable));
         let mut objective = Self {
             criterion,
             excitable,
-            prior,
+            redundant: redundant_columns(situation),
+            start,
             prior_sigmas: Vec::new(),
             columns: Vec::new(),
             prior_log_determinant: 0.0,
@@ -63,9 +70,15 @@ impl Objective {
         (!objective.columns.is_empty()).then_some(objective)
     }
 
+    /// The same criterion from the posterior of an earlier flight on (information n × n, in column units); ratios remain
+    /// those to the prior's σ.
+    pub(super) fn after_flight(&self, information: &DMatrix<f64>) -> Self {
+        Self { start: self.excitable.tr_mul(&(information * &self.excitable)), ..self.clone() }
+    }
+
     /// Covariance of the columns (n × n, in column units) after this much information.
     fn covariance(&self, gained: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-        let information = &self.prior + self.excitable.tr_mul(&(gained * &self.excitable));
+        let information = &self.start + self.excitable.tr_mul(&(gained * &self.excitable));
         let inverse = information.cholesky()?.inverse();
         Some(&self.excitable * inverse * self.excitable.transpose())
     }
@@ -126,6 +139,18 @@ impl Objective {
     pub(super) fn is_chosen(&self, column: usize) -> bool {
         self.columns.contains(&column)
     }
+
+    /// True if the parameterization has other parameters for the same motion.
+    pub(super) fn is_redundant(&self, column: usize) -> bool {
+        self.redundant[column] || self.prior_sigmas[column] <= REDUNDANT
+    }
+}
+
+/// Columns whose unit vectors lie to a good part along directions that no motion makes observable even with known joint
+/// angles.
+fn redundant_columns(situation: &Situation) -> Vec<bool> {
+    let observable = excitable_directions(&situation.chain, false);
+    observable.row_iter().map(|row| 1.0 - row.norm_squared() >= REDUNDANT_PART).collect()
 }
 
 fn sigmas_of(covariance: &DMatrix<f64>) -> Vec<f64> {

@@ -141,7 +141,7 @@ pub fn plan_motion(
     let random = |part: u64, index: usize| random_of(options.seed, 100 * part + index as u64);
     let search = |(index, (origin, start)): (usize, (String, MotionSplines))| {
         let before = fine.evaluate(start.clone())?;
-        let found = coarse.improve(coarse.evaluate(start)?, options.trials, &mut random(1, index), &|| step(1));
+        let found = coarse.improve(coarse.evaluate(start)?, options.trials, &mut random(1, index), &|_| step(1));
         let found = fine.evaluate(found.motion)?;
         let value = |searched: &SearchedMotion| objective.value(&fine.total(&searched.windows));
         let start = PlanStart { origin, before: value(&before)?, after: value(&found)? };
@@ -154,7 +154,7 @@ pub fn plan_motion(
         if index >= finalists {
             return Some((start, found));
         }
-        let found = fine.improve(found, options.trials, &mut random(2, index), &|| step(4));
+        let found = fine.improve(found, options.trials, &mut random(2, index), &|_| step(4));
         let after = objective.value(&fine.total(&found.windows))?;
         Some((PlanStart { after, ..start }, found))
     };

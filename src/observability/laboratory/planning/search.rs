@@ -43,16 +43,25 @@ pub(super) struct SearchProblem<'a> {
 pub(super) struct SearchedMotion {
     pub(super) motion: MotionSplines,
     pub(super) windows: Vec<DMatrix<f64>>,
-    value: f64,
+    /// Value that the search minimizes.
+    pub(super) value: f64,
 }
 
 /// Change of the control values of a channel: centre and half width as indices, height in the channel's unit.
 #[derive(Clone, Copy, Debug)]
-struct Bump {
-    channel: usize,
-    centre: usize,
-    width: f64,
-    height: f64,
+pub(super) struct Bump {
+    pub(super) channel: usize,
+    pub(super) centre: usize,
+    pub(super) width: f64,
+    pub(super) height: f64,
+}
+
+impl Bump {
+    /// Part of the height that is added to a control value.
+    pub(super) fn weight(&self, index: usize) -> f64 {
+        let distance = index.abs_diff(self.centre) as f64;
+        if distance <= extent(self) { (-0.5 * (distance / self.width).powi(2)).exp() } else { 0.0 }
+    }
 }
 
 impl SearchProblem<'_> {
@@ -69,13 +78,13 @@ impl SearchProblem<'_> {
         sum(windows, self.situation.information.ncols())
     }
 
-    /// Runs a number of trials from a motion; `stop` is asked after each.
+    /// Runs a number of trials from a motion; `stop` is asked after each, with the best motion so far.
     pub(super) fn improve(
         &self,
         start: SearchedMotion,
         trials: usize,
         random: &mut SplitMix64,
-        stop: &(dyn Fn() -> bool + Sync),
+        stop: &(dyn Fn(&MotionSplines) -> bool + Sync),
     ) -> SearchedMotion {
         let limits = self.limits.reduced(MARGIN);
         let mut best = start;
@@ -92,7 +101,7 @@ impl SearchProblem<'_> {
             if let Some(better) = better.filter(|_| is_better) {
                 best = better;
             }
-            if stop() {
+            if stop(&best.motion) {
                 break;
             }
         }
@@ -192,12 +201,11 @@ fn extent(bump: &Bump) -> f64 {
 }
 
 /// Adds a bump to the free control values of its channel, limited to a range.
-fn add(motion: &mut MotionSplines, bump: &Bump, (low, high): (f64, f64)) {
+pub(super) fn add(motion: &mut MotionSplines, bump: &Bump, (low, high): (f64, f64)) {
     for index in motion.free_points() {
-        let distance = index.abs_diff(bump.centre) as f64;
-        if distance <= extent(bump) {
-            let weight = (-0.5 * (distance / bump.width).powi(2)).exp();
-            let value = motion.point(bump.channel, index) + bump.height * weight;
+        let change = bump.height * bump.weight(index);
+        if change != 0.0 {
+            let value = motion.point(bump.channel, index) + change;
             motion.set_point(bump.channel, index, value.clamp(low, high));
         }
     }

@@ -9,7 +9,7 @@ use crate::geometry::SplitMix64;
 use crate::simulation::MotionSplines;
 
 /// Distance of the knots of a planned motion, in seconds.
-const KNOT_S: f64 = 0.5;
+pub const PLAN_KNOT_S: f64 = 0.5;
 /// Free control values at either end over which a start grows to its size.
 const GROWTH_POINTS: usize = 4;
 /// Shortest and longest period of the waves of a random start, in seconds.
@@ -17,7 +17,7 @@ const PERIODS_S: [f64; 2] = [2.0, 7.0];
 
 /// Motion at rest with the start angles of the joints.
 pub(super) fn at_rest(situation: &Situation, duration_s: f64) -> MotionSplines {
-    let intervals = (duration_s / KNOT_S).round().max(1.0) as usize;
+    let intervals = (duration_s / PLAN_KNOT_S).round().max(1.0) as usize;
     MotionSplines::at_rest(&situation.joints_rad, duration_s, intervals)
 }
 

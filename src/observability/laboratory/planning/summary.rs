@@ -8,6 +8,8 @@ use serde::Serialize;
 use super::super::Situation;
 use super::objective::Objective;
 use crate::geometry::Dimension;
+use crate::observability::Determination;
+use crate::text::Named as _;
 
 /// Prior and predicted σ of one parameter.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -21,6 +23,8 @@ pub struct PlannedParameter {
     pub sigma: f64,
     /// Ratio of the two.
     pub ratio: f64,
+    /// Verdict on the parameter after the motion.
+    pub verdict: Determination,
     /// True if the criterion contains it.
     pub matters: bool,
 }
@@ -60,6 +64,7 @@ impl PlanTable {
                 prior_sigma: prior[column] * scale[column],
                 sigma: after[column] * scale[column],
                 ratio: if prior[column] > 0.0 { after[column] / prior[column] } else { 1.0 },
+                verdict: Determination::of(after[column], prior[column], objective.is_redundant(column)),
                 matters: objective.is_chosen(column),
             })
             .collect();
@@ -90,8 +95,9 @@ impl fmt::Display for PlanTable {
             };
             let [prior, after] =
                 [parameter.prior_sigma, parameter.sigma].map(|sigma| format!("{:.3}{unit}", sigma * factor));
-            let note = if parameter.matters { "" } else { "  not in the criterion" };
-            writeln!(out, "  {:<16}{prior:>12}{after:>12}{:>10.3}{note}", parameter.name, parameter.ratio)?;
+            let note = if parameter.matters { "" } else { ", not in the criterion" };
+            let verdict = parameter.verdict.name();
+            writeln!(out, "  {:<16}{prior:>12}{after:>12}{:>10.3}  {verdict}{note}", parameter.name, parameter.ratio)?;
         }
         writeln!(out, "largest σ/prior {:.3} ({}), mean {:.3}", self.worst_ratio, self.worst, self.mean_ratio)
     }

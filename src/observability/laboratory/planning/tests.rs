@@ -5,22 +5,30 @@ use nalgebra::DMatrix;
 use super::super::{LaboratoryJoint, Mechanism, Situation};
 use super::objective::Objective;
 use super::windows::{WindowLayout, information_of_frames, information_of_window, sum, trajectory};
-use super::{MotionLimits, MotionPlan, MotionPlanError, PlanCriterion, PlanOptions, plan_by_hand, plan_motion, starts};
+use super::{
+    MotionLimits, MotionPlan, MotionPlanError, MotionPredictor, MotionProblem, MotionStart, PlanCriterion, PlanOptions,
+    move_point, plan_by_hand, plan_motion, starts,
+};
 use crate::camera::CameraModel;
 use crate::estimator::EstimatorConfig;
 use crate::geometry::SplitMix64;
 use crate::gimbal::Parameterization;
+use crate::observability::Determination;
 use crate::simulation::{MotionSplines, SyntheticOptions, synthetic_tracks};
 
 /// Situation before a flight with a named mechanism, a prior of 3 cm and 10°, and encoders of this σ.
 fn situation(mechanism: &str, encoder_sigma_rad: Option<f64>) -> Situation {
+    situation_in(Parameterization::Minimal, mechanism, encoder_sigma_rad)
+}
+
+fn situation_in(form: Parameterization, mechanism: &str, encoder_sigma_rad: Option<f64>) -> Situation {
     let rig = synthetic_tracks(&SyntheticOptions { duration_s: 0.5, ..SyntheticOptions::default() }).given_rig;
     let mechanism = Mechanism::named(mechanism).unwrap();
     let config = EstimatorConfig {
         chain: mechanism.chain.clone(),
         chain_prior: Some((0.03, 10_f64.to_radians())),
         camera: CameraModel::pinhole([460.0, 460.0, 320.0, 240.0], [640, 480]).unwrap(),
-        ..EstimatorConfig::for_camera(&rig, "cam0", Parameterization::Minimal).unwrap()
+        ..EstimatorConfig::for_camera(&rig, "cam0", form).unwrap()
     };
     let joints: Vec<LaboratoryJoint> =
         mechanism.joints.into_iter().map(|joint| LaboratoryJoint { limits_rad: (-0.8, 0.8), ..joint }).collect();
@@ -152,4 +160,106 @@ fn the_information_of_consecutive_windows_adds_up() {
     assert!(excess.iter().all(|excess| (0.0..0.5).contains(excess)), "{excess:.3?}");
     let mean = excess.iter().sum::<f64>() / excess.len() as f64;
     assert!(mean < 0.25, "{excess:.3?}");
+}
+
+/// Problem of 8 s with its limits, and waves.
+fn waves(situation: &Situation) -> (MotionProblem, MotionLimits, MotionSplines) {
+    let problem = MotionProblem::new(situation.clone(), 8.0).unwrap();
+    let limits = MotionLimits::slow(situation.joints.iter().map(|joint| joint.limits_rad).collect());
+    let motion = problem.start(MotionStart::Waves, &limits, 8.0);
+    (problem, limits, motion)
+}
+
+#[test]
+fn a_moved_point_moves_the_curve_there_and_linearizes_only_its_windows() {
+    let situation = situation("pan-tilt", Some(0.5_f64.to_radians()));
+    let (problem, limits, motion) = waves(&situation);
+    let mut predictor = MotionPredictor::default();
+    let before = predictor.predict(&problem, &motion).unwrap();
+    for (index, width_s) in [(7, 0.0), (8, 1.0), (14, 2.0)] {
+        let mut moved = motion.clone();
+        let time_s = motion.time_of_point(index);
+        let change = if motion.value(1, time_s, 0) > 0.0 { -0.1 } else { 0.1 };
+        move_point(&mut moved, &limits, (1, index), change, width_s);
+        let reached = moved.value(1, time_s, 0) - motion.value(1, time_s, 0);
+        assert!((reached - change).abs() < 1e-9, "{reached} at {index}");
+        let after = predictor.predict(&problem, &moved).unwrap();
+        assert_ne!(before, after);
+        // The same bits as without the windows of the last motion.
+        assert_eq!(after, MotionPredictor::default().predict(&problem, &moved).unwrap());
+        assert!([0, 2].iter().all(|channel| moved.value(*channel, time_s, 0) == motion.value(*channel, time_s, 0)));
+    }
+    let mut moved = motion.clone();
+    moved.set_point(1, 7, moved.point(1, 7) + 0.1);
+    let changed = |index: usize| motion.reach_of_point_s(index)[0]..motion.reach_of_point_s(index)[1];
+    for step in 0..=160 {
+        let time_s = 0.05 * f64::from(step);
+        let is_moved = moved.value(1, time_s, 0) != motion.value(1, time_s, 0);
+        assert!(changed(7).contains(&time_s) || !is_moved, "{time_s}");
+    }
+    // The range of the limits holds, and the ends stay at rest.
+    move_point(&mut moved, &limits, (0, 8), 10.0, 1.0);
+    move_point(&mut moved, &limits, (0, 0), 1.0, 1.0);
+    assert!(values(&moved)[..81].iter().all(|angle| *angle <= limits.range(0).1 + 1e-12));
+    assert_eq!(moved.value(0, 0.0, 0), motion.value(0, 0.0, 0));
+}
+
+#[test]
+fn a_search_continues_from_a_motion_and_can_be_stopped() {
+    let situation = situation("pan-tilt", Some(0.5_f64.to_radians()));
+    let (problem, limits, motion) = waves(&situation);
+    let worst =
+        |motion: &MotionSplines| MotionPredictor::default().predict(&problem, motion).unwrap().result().worst_ratio;
+    let improved = problem.improve(&motion, &limits, 60, &|_, _| ControlFlow::Continue(())).unwrap();
+    assert!(worst(&improved) < 0.9 * worst(&motion), "{} {}", worst(&improved), worst(&motion));
+    assert!(limits.compare(&improved, &[]).iter().all(super::ReachedLimit::is_kept));
+    assert_eq!(improved, problem.improve(&motion, &limits, 60, &|_, _| ControlFlow::Continue(())).unwrap());
+    let stopped = problem.improve(&motion, &limits, 60, &|_, _| ControlFlow::Break(())).unwrap();
+    assert!(worst(&stopped) <= worst(&motion) + 1e-12);
+    // Nothing is left of a motion that stands still.
+    let rest = problem.start(MotionStart::AtRest, &limits, 8.0);
+    assert!((worst(&rest) - 1.0).abs() < 0.05, "{}", worst(&rest));
+}
+
+#[test]
+fn information_of_a_flight_adds_to_that_of_a_motion() {
+    let situation = situation("pan-tilt", Some(0.5_f64.to_radians()));
+    let (problem, _, motion) = waves(&situation);
+    let gained = |motion: &MotionSplines| {
+        let layout = WindowLayout::fine(8.0);
+        let flight = trajectory(&situation, motion);
+        let windows: Vec<DMatrix<f64>> = (0..layout.count)
+            .map(|window| information_of_window(&situation, motion, &flight, &layout, window).unwrap())
+            .collect();
+        sum(&windows, situation.information.ncols())
+    };
+    let information = &situation.information + gained(&motion);
+    let flown = Situation { information, ..situation.clone() };
+    let after = problem.after_flight(&flown).unwrap();
+    let prediction = MotionPredictor::default().predict(&after, &motion).unwrap();
+    let (flight, both) = (prediction.flight.unwrap(), prediction.both.unwrap());
+    for ((flight, alone), both) in flight.parameters.iter().zip(&prediction.motion.parameters).zip(&both.parameters) {
+        // The flight was this very motion; both together have twice its information.
+        assert!((flight.sigma / alone.sigma - 1.0).abs() < 1e-9, "{flight:?} {alone:?}");
+        assert!(both.sigma < flight.sigma && both.sigma > 0.7 * flight.sigma, "{both:?}");
+        assert_eq!(both.prior_sigma, alone.prior_sigma);
+    }
+    let other = self::situation("yaw-roll-pitch-offset", None);
+    assert!(problem.after_flight(&other).is_none());
+}
+
+#[test]
+fn parameters_that_a_parameterization_has_twice_are_called_redundant() {
+    let verdicts = |form: Parameterization| {
+        let situation = situation_in(form, "yaw-roll-pitch-offset", Some(0.5_f64.to_radians()));
+        let problem = MotionProblem::new(situation.clone(), 8.0).unwrap();
+        let limits = MotionLimits::slow(situation.joints.iter().map(|joint| joint.limits_rad).collect());
+        let rest = problem.start(MotionStart::AtRest, &limits, 8.0);
+        let table = MotionPredictor::default().predict(&problem, &rest).unwrap().motion;
+        let count = |verdict| table.parameters.iter().filter(|parameter| parameter.verdict == verdict).count();
+        (count(Determination::Redundant), count(Determination::NotDetermined))
+    };
+    let (redundant, open) = verdicts(Parameterization::Classical);
+    assert!(redundant >= 6 && open > 0, "{redundant} redundant, {open} not determined");
+    assert_eq!(verdicts(Parameterization::Minimal).0, 0);
 }

@@ -22,6 +22,13 @@ const IMU_RATE_HZ: f64 = 50.0;
 /// Time between the frames of a planned motion, in seconds.
 pub const PLAN_FRAME_PERIOD_S: f64 = ADVICE_DURATION_S / FRAMES as f64;
 
+/// Distances of an assumed scene from its nearest to its farthest point, in equal ratios.
+pub fn scene_distances_m([near_m, far_m]: [f64; 2]) -> Vec<f64> {
+    const DISTANCES: usize = 7;
+    let ratio = |index: usize| index as f64 / (DISTANCES - 1) as f64;
+    (0..DISTANCES).map(|index| near_m * (far_m / near_m).powf(ratio(index))).collect()
+}
+
 /// Division of a flight into windows of equal length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct WindowLayout {

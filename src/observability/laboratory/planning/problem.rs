@@ -1,0 +1,232 @@
+//! Prediction of σ for given motions, alone and after a flight, and the search that starts from one of them.
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
+use super::super::Situation;
+use super::by_hand::choose;
+use super::limits::MotionLimits;
+use super::objective::{Objective, PlanCriterion};
+use super::plan::{MotionPlanError, PLAN_DURATION_S};
+use super::search::SearchProblem;
+use super::starts;
+use super::summary::PlanTable;
+use super::windows::{WindowLayout, information_of_window, sum, trajectory};
+use crate::geometry::SplitMix64;
+use crate::simulation::MotionSplines;
+use crate::text::Named;
+
+/// Ratio of coarse trials to fine ones of a search: a fine one takes about four times as long.
+const COARSE_PER_FINE: usize = 3;
+/// Time of a fine trial in coarse ones.
+const FINE_WEIGHT: usize = 4;
+/// Seed of the random numbers of starts and searches.
+const SEED: u64 = 1;
+
+/// Motion from which a plan is edited.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum MotionStart {
+    /// Everything stands still.
+    AtRest,
+    /// Slow waves in every channel.
+    #[default]
+    Waves,
+    /// The moves of `plan_by_hand`, one after the other.
+    Moves,
+}
+
+impl Named for MotionStart {
+    const NAMES: &'static [(Self, &'static str)] =
+        &[(Self::AtRest, "at rest"), (Self::Waves, "waves"), (Self::Moves, "best moves in turn")];
+}
+
+/// Criterion and windows of the motions of one duration: the largest ratio of σ to the prior's.
+#[derive(Clone, Debug)]
+pub struct MotionProblem {
+    situation: Arc<Situation>,
+    layout: WindowLayout,
+    from_prior: Objective,
+    /// Criterion from the posterior of a flight on.
+    after_flight: Option<Objective>,
+}
+
+/// σ of all parameters at the end of a motion.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MotionPrediction {
+    /// At the end of the flight; `None` without one.
+    pub flight: Option<PlanTable>,
+    /// After the motion alone.
+    pub motion: PlanTable,
+    /// After the flight and the motion.
+    pub both: Option<PlanTable>,
+}
+
+impl MotionPrediction {
+    /// σ after everything that is known: the flight, if there is one, and the motion.
+    pub fn result(&self) -> &PlanTable {
+        self.both.as_ref().unwrap_or(&self.motion)
+    }
+}
+
+impl MotionProblem {
+    /// Problem of motions of this duration.
+    ///
+    /// # Errors
+    /// If the duration is out of range, or nothing is observable.
+    pub fn new(situation: Situation, duration_s: f64) -> Result<Self, MotionPlanError> {
+        let [shortest_s, longest_s] = PLAN_DURATION_S;
+        if !(shortest_s..=longest_s).contains(&duration_s) {
+            return Err(MotionPlanError::Duration { given: duration_s });
+        }
+        let from_prior = Objective::new(&situation, PlanCriterion::Worst, &[]);
+        Ok(Self {
+            from_prior: from_prior.ok_or(MotionPlanError::NothingObservable)?,
+            situation: Arc::new(situation),
+            layout: WindowLayout::fine(duration_s),
+            after_flight: None,
+        })
+    }
+
+    /// The same problem after a flight whose state at its end this is; `None` if the flight estimates other parameters.
+    #[must_use]
+    pub fn after_flight(&self, flight: &Situation) -> Option<Self> {
+        let (own, other) = (&self.situation.chain, &flight.chain);
+        let same = own.parameterization() == other.parameterization() && own.parameters() == other.parameters();
+        let objective = || self.from_prior.after_flight(&flight.information);
+        same.then(|| Self { after_flight: Some(objective()), ..self.clone() })
+    }
+
+    pub fn situation(&self) -> &Situation {
+        &self.situation
+    }
+
+    /// Motion within the limits from which to start.
+    pub fn start(&self, start: MotionStart, limits: &MotionLimits, duration_s: f64) -> MotionSplines {
+        let situation = &*self.situation;
+        let motion = match start {
+            MotionStart::AtRest => starts::at_rest(situation, duration_s),
+            MotionStart::Waves => starts::random(situation, limits, duration_s, &mut SplitMix64::new(SEED)),
+            MotionStart::Moves => {
+                let chosen = choose(situation, self.objective(), &self.layout);
+                let moves: Vec<_> = chosen.into_iter().map(|chosen| chosen.choice).collect();
+                starts::of_moves(situation, limits, duration_s, &moves, self.layout.length_s)
+            }
+        };
+        self.search(limits).within_limits(motion)
+    }
+
+    /// Searches a motion with a smaller criterion from a given one, which is first made smaller until it is within the
+    /// limits: `trials` changes with coarse windows, then a third as many with fine ones.
+    ///
+    /// `watch` receives the progress from 0 to 1 and the best motion so far; if it stops the search, the result is that
+    /// motion. `None` when a number is not finite.
+    pub fn improve(
+        &self,
+        motion: &MotionSplines,
+        limits: &MotionLimits,
+        trials: usize,
+        watch: &(dyn Fn(f64, &MotionSplines) -> ControlFlow<()> + Sync),
+    ) -> Option<MotionSplines> {
+        let fine = self.search(limits);
+        let coarse = SearchProblem { layout: WindowLayout::coarse(motion.duration_s()), ..fine };
+        let fine_trials = trials.div_ceil(COARSE_PER_FINE);
+        let total = trials + FINE_WEIGHT * fine_trials;
+        let (done, is_stopped) = (AtomicUsize::new(0), AtomicBool::new(false));
+        let step = |weight: usize, best: &MotionSplines| {
+            let done = done.fetch_add(weight, Ordering::Relaxed) + weight;
+            if watch(done as f64 / total.max(1) as f64, best).is_break() {
+                is_stopped.store(true, Ordering::Relaxed);
+            }
+            is_stopped.load(Ordering::Relaxed)
+        };
+        let mut random = SplitMix64::new(SEED);
+        let begin = fine.evaluate(fine.within_limits(motion.clone()))?;
+        let start = coarse.evaluate(begin.motion.clone())?;
+        let found = coarse.improve(start, trials, &mut random, &|best| step(1, best));
+        let found = fine.evaluate(found.motion)?;
+        // Coarse windows may prefer another motion than fine ones.
+        let found = if found.value < begin.value { found } else { begin };
+        if is_stopped.load(Ordering::Relaxed) {
+            return Some(found.motion);
+        }
+        Some(fine.improve(found, fine_trials, &mut random, &|best| step(FINE_WEIGHT, best)).motion)
+    }
+
+    fn objective(&self) -> &Objective {
+        self.after_flight.as_ref().unwrap_or(&self.from_prior)
+    }
+
+    fn search<'a>(&'a self, limits: &'a MotionLimits) -> SearchProblem<'a> {
+        SearchProblem { situation: &self.situation, objective: self.objective(), limits, layout: self.layout }
+    }
+
+    /// σ with the information of the windows of a motion.
+    fn prediction(&self, windows: &[DMatrix<f64>]) -> Option<MotionPrediction> {
+        let columns = self.situation.information.ncols();
+        let (gained, nothing) = (sum(windows, columns), DMatrix::zeros(columns, columns));
+        let table = |objective: &Objective, gained: &DMatrix<f64>| PlanTable::new(&self.situation, objective, gained);
+        let after = |gained: &DMatrix<f64>| self.after_flight.as_ref().map(|objective| table(objective, gained));
+        Some(MotionPrediction {
+            flight: after(&nothing).map_or(Some(None), |table| table.map(Some))?,
+            motion: table(&self.from_prior, &gained)?,
+            both: after(&gained).map_or(Some(None), |table| table.map(Some))?,
+        })
+    }
+}
+
+/// Predicts motions one after the other; windows in which a motion equals the last one are not linearized again.
+#[derive(Clone, Debug, Default)]
+pub struct MotionPredictor {
+    last: Option<PredictedWindows>,
+}
+
+/// Windows of the last motion, and what they depend on.
+#[derive(Clone, Debug)]
+struct PredictedWindows {
+    situation: Arc<Situation>,
+    motion: MotionSplines,
+    information: Vec<DMatrix<f64>>,
+}
+
+impl MotionPredictor {
+    /// Predicts σ after a motion; `None` when a number is not finite.
+    pub fn predict(&mut self, problem: &MotionProblem, motion: &MotionSplines) -> Option<MotionPrediction> {
+        let known = self.last.take().filter(|last| Arc::ptr_eq(&last.situation, &problem.situation));
+        let (situation, layout) = (&*problem.situation, &problem.layout);
+        let changed = known.as_ref().map_or_else(|| vec![true; layout.count], |known| known.changed(motion, layout));
+        let flight = trajectory(situation, motion);
+        let of = |window: usize| match &known {
+            Some(known) if !changed[window] => Some(known.information[window].clone()),
+            _ => information_of_window(situation, motion, &flight, layout, window),
+        };
+        let information: Vec<DMatrix<f64>> = (0..layout.count).into_par_iter().map(of).collect::<Option<_>>()?;
+        let prediction = problem.prediction(&information);
+        self.last =
+            Some(PredictedWindows { situation: Arc::clone(&problem.situation), motion: motion.clone(), information });
+        prediction
+    }
+}
+
+impl PredictedWindows {
+    /// True for each window in which another motion differs from this one.
+    fn changed(&self, motion: &MotionSplines, layout: &WindowLayout) -> Vec<bool> {
+        let same_knots = self.motion.point_count() == motion.point_count()
+            && self.motion.channel_count() == motion.channel_count()
+            && self.motion.duration_s() == motion.duration_s();
+        if !same_knots || self.information.len() != layout.count {
+            return vec![true; layout.count];
+        }
+        let mut changed = vec![false; layout.count];
+        let differs = |index: usize| {
+            (0..motion.channel_count()).any(|it| self.motion.point(it, index) != motion.point(it, index))
+        };
+        for index in (0..motion.point_count()).filter(|index| differs(*index)) {
+            changed[layout.within(motion.reach_of_point_s(index))].fill(true);
+        }
+        changed
+    }
+}
