@@ -7,16 +7,17 @@ use anyhow::{Context as _, Result, bail};
 use clap::{Args, ValueEnum};
 use dcvins::export::{
     PANEL_NAMES, Renderer, STUDY_PANEL_NAMES, ScreenshotOptions, check_screenshot, draw_panel, draw_panel_svg,
-    figure_bytes, is_session, panel_csv, png_bytes, write_screenshot,
+    figure_bytes, is_session, panel_csv, png_bytes, read_motion, write_screenshot,
 };
 use dcvins::flight_log::{ImageReader, log_name};
 use dcvins::geometry::{ns_from_seconds, seconds_from_ns};
 use dcvins::gui::app::PlayingLog;
 use dcvins::gui::theme::ThemeName;
 use dcvins::gui::window::{FigureFormat, FigureInput, Preset};
-use dcvins::gui::{ImageSource, Playback, Presentation};
+use dcvins::gui::{ImageSource, PanelName, Playback, Presentation};
 use dcvins::observability::SlideRequest;
 use dcvins::session::{Computation, Session, SessionPlan};
+use dcvins::simulation::PrescribedMotion;
 use dcvins::sweep::{OpenedStudy, is_study};
 use dcvins::text::Named as _;
 
@@ -76,6 +77,9 @@ pub(crate) struct ScreenshotArguments {
     /// and image show the moved chain.
     #[arg(long, value_name = "DIRECTION=VALUE")]
     pub slide: Option<SlideRequest>,
+    /// Motion that the laboratory shows as the planned one with its predicted σ: a CSV file as `dcvins plan` writes it.
+    #[arg(long, value_name = "FILE.csv")]
+    pub motion: Option<PathBuf>,
     /// Draw a single panel with its buttons and selectors, as in the window, instead of as a figure.
     #[arg(long)]
     pub controls: bool,
@@ -163,6 +167,11 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<ExitOutcome>
         bail!("--csv writes the values of one panel: name the panel with --panel");
     }
     let format = format_of(arguments)?;
+    let shows_motion = ["all", PanelName::Laboratory.name()].contains(&arguments.panel.as_str());
+    let is_of_paper = arguments.figure.has_paper_size() || format == FormatArgument::Pdf;
+    if arguments.motion.is_some() && (!shows_motion || is_of_paper) {
+        bail!("--motion is shown by the laboratory as PNG or SVG: give --panel laboratory, without a size on paper");
+    }
     let range_ns = arguments.figure.range_ns()?;
     let (log, estimation) = prepared_log(std::slice::from_ref(&arguments.log), &arguments.estimation)?;
     let arguments = &ScreenshotArguments { log, estimation, ..arguments.clone() };
@@ -214,7 +223,9 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<ExitOutcome>
     let playback = shown.playback();
     let run = arguments.figure.run(computation.recording())?;
     let view = arguments.figure.view;
-    let options = ScreenshotOptions { slide, run, view, visible_ns: range_ns, playback, ..drawing_options(arguments) };
+    let motion = shown.motion.clone();
+    let options =
+        ScreenshotOptions { slide, run, view, motion, visible_ns: range_ns, playback, ..drawing_options(arguments) };
     for (number, cursor_ns) in stamps_ns.iter().copied().enumerate() {
         if interrupt.is_set() {
             return stopped(number);
@@ -225,7 +236,7 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<ExitOutcome>
         let panel = &arguments.panel;
         let at_ns = (!instants.is_assumed).then_some(cursor_ns);
         let picture = match format {
-            _ if arguments.figure.has_paper_size() || format == FormatArgument::Pdf => {
+            _ if is_of_paper => {
                 let spec = arguments.figure.spec(panel, options.theme, at_ns, recording)?;
                 let input = FigureInput::new(recording, shown.images(), &options.playback, slide);
                 figure_bytes(&spec, format.of_figure(), &own_command_line(), input)?
@@ -325,6 +336,9 @@ fn of_study(arguments: &ScreenshotArguments) -> Result<ExitOutcome> {
     if !arguments.at.is_empty() || arguments.every.is_some() || !arguments.estimation.runs.is_empty() {
         bail!("{} is a study: leave --at, --every and --run out", arguments.log.display());
     }
+    if arguments.motion.is_some() {
+        bail!("{} is a study: leave --motion out", arguments.log.display());
+    }
     if !STUDY_PANEL_NAMES.contains(&arguments.panel.as_str()) {
         bail!("unknown panel '{}' of a study: expected one of {}", arguments.panel, STUDY_PANEL_NAMES.join(", "));
     }
@@ -381,6 +395,8 @@ struct Shown {
     log_end_ns: i64,
     start_s: f64,
     duration_s: Option<f64>,
+    /// Motion of `--motion`, with the joints of the rig.
+    motion: Option<PrescribedMotion>,
 }
 
 enum Source {
@@ -403,11 +419,16 @@ impl Shown {
             let (start_s, duration_s) = (plan.start_s, plan.duration_s);
             (Source::Log(Box::new(plan), images), start_s, duration_s)
         };
-        let log_end_ns = match &source {
-            Source::Log(plan, _) => plan.log.duration_ns(),
-            Source::Saved(session) => session.recording().duration_ns,
+        let (log_end_ns, joint_names) = match &source {
+            Source::Log(plan, _) => (plan.log.duration_ns(), plan.rig.joint_names()),
+            Source::Saved(session) => (session.recording().duration_ns, session.recording().rig.joint_names()),
         };
-        Ok(Self { source, log_end_ns, start_s, duration_s })
+        let motion = |path: &PathBuf| {
+            let with_path = || format!("the motion {}", path.display());
+            read_motion(path)?.with_joints(&joint_names).map_err(anyhow::Error::msg).with_context(with_path)
+        };
+        let motion = arguments.motion.as_ref().map(motion).transpose()?;
+        Ok(Self { source, log_end_ns, start_s, duration_s, motion })
     }
 
     /// Cache entry of the screenshots; `None` for a saved session, and for a graphics adapter, because its images
@@ -422,7 +443,13 @@ impl Shown {
             ScreenshotArguments { output: PathBuf::new(), format: Some(format), force: false, ..arguments.clone() };
         let is_figure = arguments.figure.has_paper_size() || format == FormatArgument::Pdf;
         let command = if is_figure { own_command_line() } else { String::new() };
-        arguments.cache.result_of(&format!("{options:?}{command}"), &arguments.log, &arguments.estimation, plan)
+        let motion = &self.motion;
+        arguments.cache.result_of(
+            &format!("{options:?}{motion:?}{command}"),
+            &arguments.log,
+            &arguments.estimation,
+            plan,
+        )
     }
 
     /// Computes the runs up to a stamp; those of a saved session to their end.

@@ -8,10 +8,14 @@ use directories::UserDirs;
 
 use super::recent_files::{RecentFiles, state_folder};
 use super::{report, sample_flight};
-use crate::export::{ExportError, is_session, write_csv, write_new_rig, write_png, write_screenshot, write_svg};
+use crate::export::{
+    ExportError, is_session, read_motion, write_csv, write_motion, write_new_rig, write_png, write_screenshot,
+    write_svg,
+};
 use crate::flight_log::output;
 use crate::gui::desktop::{Desktop, DrawnFigure, FigureExport, PanelExport, PathEntry, SampleProgress};
 use crate::sensors::Rig;
+use crate::simulation::{MotionSplines, PrescribedMotion};
 
 /// Maximum number of entries read from a folder.
 const MAX_ENTRIES: usize = 5000;
@@ -218,6 +222,18 @@ impl Desktop for Machine {
         Ok(fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf()))
     }
 
+    fn write_motion(&self, path: &Path, motion: &MotionSplines, joint_names: &[String]) -> Result<PathBuf, String> {
+        write_motion(motion, joint_names, path).map_err(|error| match error {
+            ExportError::Existing { .. } => format!("the file exists; give another name: {}", path.display()),
+            error => error.to_string(),
+        })?;
+        Ok(fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf()))
+    }
+
+    fn read_motion(&self, path: &Path) -> Result<PrescribedMotion, String> {
+        read_motion(path).map_err(|error| error.to_string())
+    }
+
     fn resident_bytes(&self) -> Option<u64> {
         let status = fs::read_to_string("/proc/self/status").ok()?;
         let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
@@ -322,6 +338,25 @@ mod tests {
         assert_eq!(fs::read_to_string(&written).unwrap(), sample);
         let problem = machine.write_rig(&path, sample).unwrap_err();
         assert!(problem.starts_with("the rig exists; give another file name"), "{problem}");
+    }
+
+    #[test]
+    fn a_motion_is_written_once_and_read_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let machine = machine_in(folder.path());
+        let path = folder.path().join("plans/motion.csv");
+        let mut motion = MotionSplines::at_rest(&[0.1], 8.0, 16);
+        motion.set_point(0, 9, 0.4);
+        machine.write_motion(&path, &motion, &["pan".to_owned()]).unwrap();
+        let read = machine.read_motion(&path).unwrap();
+        let again = MotionSplines::with_knots(&read.with_joints(&["pan".to_owned()]).unwrap(), 0.5);
+        for index in 0..motion.point_count() {
+            assert!((again.point(0, index) - motion.point(0, index)).abs() < 1e-9, "{index}");
+        }
+        let problem = machine.write_motion(&path, &motion, &["pan".to_owned()]).unwrap_err();
+        assert!(problem.starts_with("the file exists; give another name"), "{problem}");
+        let problem = machine.read_motion(&folder.path().join("other.csv")).unwrap_err();
+        assert!(problem.contains("other.csv"), "{problem}");
     }
 
     #[test]

@@ -50,7 +50,7 @@ pub use existing::{
 pub use figure::figure_bytes;
 pub use flight_noise::{DensityReport, FlightNoiseReport};
 pub use masks::write_masks;
-pub use motion_csv::read_motion;
+pub use motion_csv::{read_motion, write_motion};
 pub use noise_files::{write_allan, write_flight_noise};
 pub use plan_files::{PlanReport, PlannedFlight, check_plan_folder, write_plan};
 pub use posterior::{FlightEntry, SigmaTable, prior_of_calibration, prior_of_run, read_prior};

@@ -8,6 +8,7 @@ use nalgebra::Vector3;
 
 use super::error::ExportError;
 use crate::flight_log::csv_writer::{CsvWriter, number_cell};
+use crate::flight_log::output;
 use crate::simulation::{MotionSample, MotionSplines, PrescribedMotion};
 
 /// Columns before and after those of the joints.
@@ -33,6 +34,20 @@ pub(super) fn motion_csv(motion: &MotionSplines, joint_names: &[String]) -> Stri
         table.row(numbers.map(number_cell));
     }
     table.into_text()
+}
+
+/// Writes a motion into a new CSV file, and creates its folder if necessary.
+///
+/// # Errors
+/// If the file exists or cannot be written.
+pub fn write_motion(motion: &MotionSplines, joint_names: &[String], path: &Path) -> Result<(), ExportError> {
+    if path.exists() {
+        return Err(ExportError::Existing { problem: "the file exists".to_owned(), path: path.to_owned() });
+    }
+    if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+        fs::create_dir_all(folder).map_err(ExportError::write(folder))?;
+    }
+    output::write_file(path, motion_csv(motion, joint_names).as_bytes()).map_err(ExportError::write(path))
 }
 
 /// Reads a motion from a CSV file.

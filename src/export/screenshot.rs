@@ -21,6 +21,7 @@ use crate::gui::window::{MainWindow, Panels, Preset, alone_ui, complete, panel_t
 use crate::gui::{ImageSource, PanelContext, PanelName, Playback, Presentation, Selection};
 use crate::observability::SlidePosition;
 use crate::session::Recording;
+use crate::simulation::PrescribedMotion;
 use crate::text::Named as _;
 
 /// Name of the whole window, and of the whole view of a study.
@@ -74,6 +75,8 @@ pub struct ScreenshotOptions {
     pub visible_ns: Option<(i64, i64)>,
     /// View of the comparison panel; `None` for all views that fit.
     pub view: Option<ComparisonView>,
+    /// Planned motion that the laboratory shows; `None` for a listed one.
+    pub motion: Option<PrescribedMotion>,
     /// Presentation of a single panel: as a figure or with its controls; the whole window always has its controls.
     pub presentation: Presentation,
 }
@@ -91,7 +94,16 @@ impl Default for ScreenshotOptions {
             playback: Playback::default(),
             visible_ns: None,
             view: None,
+            motion: None,
             presentation: Presentation::Figure,
+        }
+    }
+}
+
+impl ScreenshotOptions {
+    fn open_motion(&self, panels: &mut Panels) {
+        if let Some(motion) = &self.motion {
+            panels.laboratory.open_motion(motion.clone());
         }
     }
 }
@@ -151,7 +163,7 @@ pub fn draw_panel_svg(
     })
 }
 
-/// The values of a panel as CSV; of the options only the slide has an effect.
+/// The values of a panel as CSV; of the options run, slide and motion have an effect.
 ///
 /// # Errors
 /// If the name is not that of a single panel.
@@ -170,7 +182,9 @@ pub fn panel_csv(
     let (selection, commands, playback, theme) = (&mut selection, &mut Vec::new(), &playback, &theme);
     let presentation = options.presentation;
     let ctx = &mut PanelContext { recording, cursor_ns, playback, images, selection, theme, presentation, commands };
-    Ok(panel_table(panel, &mut MainWindow::default(), ctx))
+    let mut window = MainWindow::default();
+    options.open_motion(&mut window.panels);
+    Ok(panel_table(panel, &mut window, ctx))
 }
 
 /// Passes the panel's user interface to a function that draws it.
@@ -190,8 +204,10 @@ fn with_panel<T>(
     let theme = Theme::of(options.theme);
     let mut window = MainWindow::default();
     window.arrange(options.layout);
+    options.open_motion(&mut window.panels);
     let panels = RefCell::new(Panels::default());
     panels.borrow_mut().comparison.view = options.view;
+    options.open_motion(&mut panels.borrow_mut());
     let (run, slide, visible_ns) = (options.run, options.slide, options.visible_ns);
     let mut selection = Selection { run, visible_ns, slide, ..Selection::default() };
     let playback = Playback { playing: false, ..options.playback.clone() };

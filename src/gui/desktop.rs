@@ -6,6 +6,8 @@ use std::sync::mpsc::Receiver;
 
 use image::RgbaImage;
 
+use crate::simulation::{MotionSplines, PrescribedMotion};
+
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PathEntry {
     /// Whole path, as typed.
@@ -95,6 +97,10 @@ pub trait Desktop: Send + Sync {
     fn write_session(&self, name: &str, text: &str) -> Result<PathBuf, String>;
     /// Writes the text of a new rig after reading it as a rig, and returns its path; an existing file is not replaced.
     fn write_rig(&self, path: &Path, text: &str) -> Result<PathBuf, String>;
+    /// Writes a motion with the names of its joints, and returns its path; an existing file is not replaced.
+    fn write_motion(&self, path: &Path, motion: &MotionSplines, joint_names: &[String]) -> Result<PathBuf, String>;
+    /// Reads a motion.
+    fn read_motion(&self, path: &Path) -> Result<PrescribedMotion, String>;
     /// Resident memory of this process in bytes.
     fn resident_bytes(&self) -> Option<u64>;
 }

@@ -23,6 +23,7 @@ use dcvins::gui::window::{MainWindow, Preset, window_ui};
 use dcvins::gui::{Dialog, PanelContext, PanelName, Playback, Presentation, Selection};
 use dcvins::session::breakpoints::Breakpoints;
 use dcvins::session::{self, Recording, SessionPlan, SessionRequest};
+use dcvins::simulation::{MotionSplines, PrescribedMotion};
 use dcvins::study::view::Study;
 use dcvins::text::Named as _;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
@@ -237,6 +238,14 @@ impl Desktop for Paper {
 
     fn write_rig(&self, path: &Path, _text: &str) -> Result<PathBuf, String> {
         Ok(path.to_path_buf())
+    }
+
+    fn write_motion(&self, path: &Path, _motion: &MotionSplines, _joints: &[String]) -> Result<PathBuf, String> {
+        Ok(path.to_path_buf())
+    }
+
+    fn read_motion(&self, path: &Path) -> Result<PrescribedMotion, String> {
+        Err(format!("no motion in {}", path.display()))
     }
 
     fn sample_folder(&self) -> &Path {

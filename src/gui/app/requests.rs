@@ -6,6 +6,7 @@ use super::App;
 use super::departure::{Leaving, Work};
 use super::open_request::OpenRequest;
 use crate::gui::desktop::{FigureExport, PanelExport};
+use crate::gui::laboratory::MotionRequest;
 use crate::gui::window::{NoticeLevel, WindowRequest};
 
 impl App {
@@ -32,6 +33,7 @@ impl App {
                 }
                 WindowRequest::WritePanel(export) => self.write_panel(&export),
                 WindowRequest::WriteFigure(export) => self.write_figure(&export),
+                WindowRequest::Motion(request) => self.exchange_motion(&request),
                 WindowRequest::WriteReport => self.start_report(),
             }
         }
@@ -54,6 +56,24 @@ impl App {
                 self.state.notices.show_message(NoticeLevel::Error, problem);
                 false
             }
+        }
+    }
+
+    /// Writes or reads the file of a planned motion.
+    fn exchange_motion(&mut self, request: &MotionRequest) {
+        let done = match request {
+            MotionRequest::Write { path, motion, joint_names } => {
+                let written = self.desktop.write_motion(path, motion, joint_names);
+                written.map(|path| format!("Motion saved:\n{}", path.display()))
+            }
+            MotionRequest::Read { path } => self.desktop.read_motion(path).map(|motion| {
+                self.state.panels.laboratory.open_motion(motion);
+                format!("Motion opened:\n{}", path.display())
+            }),
+        };
+        match done {
+            Ok(text) => self.state.notices.show_message(NoticeLevel::Info, text),
+            Err(problem) => self.state.notices.show_message(NoticeLevel::Error, problem),
         }
     }
 

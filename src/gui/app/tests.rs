@@ -10,10 +10,13 @@ use egui_kittest::kittest::Queryable as _;
 
 use super::{App, OpenFailure, OpenLog, OpenedLog, PlayingLog};
 use crate::gui::desktop::{Desktop, FigureExport, PanelExport, PathEntry, SampleProgress};
+use crate::gui::laboratory::MotionRequest;
 use crate::gui::samples::{FRAME_PERIOD_NS, first_tracked_frame, sample_images, sample_recording_of};
 use crate::gui::theme::ThemeName;
+use crate::gui::window::WindowRequest;
 use crate::gui::{ImageSource as _, Playback};
 use crate::session::{Command, FrameImage, Recording, Wake};
+use crate::simulation::{MotionSplines, PrescribedMotion};
 
 /// A log with finished results.
 pub(super) struct SampleLog {
@@ -107,6 +110,8 @@ pub(super) struct TestDesktop {
     picked: Mutex<Option<Receiver<Vec<PathBuf>>>>,
     /// Rigs that were written, with their texts.
     pub(super) rigs: Mutex<Vec<(PathBuf, String)>>,
+    /// Motions that were written, with their paths.
+    pub(super) motions: Mutex<Vec<(PathBuf, PrescribedMotion)>>,
 }
 
 impl Desktop for TestDesktop {
@@ -196,6 +201,21 @@ impl Desktop for TestDesktop {
     fn write_rig(&self, path: &Path, text: &str) -> Result<PathBuf, String> {
         self.rigs.lock().unwrap().push((path.to_path_buf(), text.to_owned()));
         Ok(path.to_path_buf())
+    }
+
+    fn write_motion(&self, path: &Path, motion: &MotionSplines, joint_names: &[String]) -> Result<PathBuf, String> {
+        let steps = (2.0 * motion.duration_s()).round().max(1.0) as usize;
+        let times_s = (0..=steps).map(|step| motion.duration_s() * step as f64 / steps as f64);
+        let samples = times_s.map(|time_s| motion.sample(time_s)).collect();
+        let motion = PrescribedMotion { joint_names: joint_names.to_vec(), samples };
+        self.motions.lock().unwrap().push((path.to_path_buf(), motion));
+        Ok(path.to_path_buf())
+    }
+
+    fn read_motion(&self, path: &Path) -> Result<PrescribedMotion, String> {
+        let motions = self.motions.lock().unwrap();
+        let found = motions.iter().find(|(known, _)| known == path).map(|(_, motion)| motion.clone());
+        found.ok_or_else(|| format!("no motion in {}", path.display()))
     }
 
     fn resident_bytes(&self) -> Option<u64> {
@@ -402,6 +422,26 @@ fn commands_reach_the_log_and_playing_moves_the_cursor() {
     let before = cursor(&harness);
     harness.run_steps(5);
     assert_eq!(cursor(&harness), before);
+}
+
+#[test]
+fn a_motion_is_written_and_opened_with_a_notice() {
+    let (mut harness, desktop) = app();
+    harness.get_by_label("Open yard.mcap").click();
+    run_until(&mut harness, |harness| opened(harness).is_some());
+    let path = PathBuf::from("/out/motion.csv");
+    let motion = MotionSplines::at_rest(&[0.1, 0.2, 0.3], 8.0, 16);
+    let joint_names = harness.state().log().unwrap().recording().rig.joint_names();
+    for (request, words) in [
+        (MotionRequest::Read { path: path.clone() }, "no motion in /out/motion.csv"),
+        (MotionRequest::Write { path: path.clone(), motion, joint_names }, "Motion saved:"),
+        (MotionRequest::Read { path }, "Motion opened:"),
+    ] {
+        harness.state_mut().state.requests.push(WindowRequest::Motion(request));
+        harness.run_steps(3);
+        assert!(harness.query_by_label_contains(words).is_some(), "{words}");
+    }
+    assert_eq!(desktop.motions.lock().unwrap().len(), 1);
 }
 
 #[test]

@@ -228,6 +228,13 @@ pub(crate) mod window {
         SPURIOUS: "spurious information" => "Information of the priors on directions that no measurement constrains, as a singular value (1: σ of 10° or 3 cm).";
         RANKS_OVER_TIME: "ranks over time" => "Informed rank of each run by step, and faint the structural rank (rank.csv).";
         ASSUMPTIONS: "assumptions" => "Synthetic window of the experiment: motion, knowledge of joint angles and poses, number of frames and landmarks. No log is used.";
+        PLAN_SIGMA: "planned σ" => "Predicted σ of the calibration after a motion in a synthetic scene, divided by the prior σ. Each window of 4 s is linearized as a step of the run would be; what this log has measured is added.";
+        PLAN_LIMITS: "limits of a plan" => "Limits of the planned motion, as the options of dcvins plan. The search keeps them; a dragged curve that exceeds one is red.";
+        PLAN_SCENE: "scene of a plan" => "Distances of the landmarks from the camera: an assumed range, or the landmarks of the selected run at its end.";
+        PLAN_WIDTH: "width of a drag" => "Half width in s of the part of the curve that a dragged point takes along.";
+        PLAN_START: "start of a plan" => "Motion to begin with: everything at rest, slow waves in all joints and axes, or the best moves by hand one after the other (seconds).";
+        PLAN_OPTIMIZE: "optimization of a plan" => "Searches a motion with a smaller largest σ / prior from this one, within the limits; after this log, if there is one. The best motion so far is shown; undo is one step.";
+        PLAN_FILE: "file of a motion" => "CSV as dcvins plan writes it: dcvins simulate --motion FILE flies it. An existing file is not replaced.";
         IMAGE_PLANE: "residuals over the image" => "Mean reprojection residual after the solve by place in the image. A wrong focal length or distortion is a radial pattern, a wrong readout time a slope over the rows, an object without a mask a group of cells.";
         JACOBIAN_NORM: "block norm" => "Frobenius norm of a block of the whitened Jacobian: change of the residuals in σ per 10°, 3 cm, 0.1 m/s, 1 °/s, 0.1 m/s² or 10 % of the inverse depth.";
     }

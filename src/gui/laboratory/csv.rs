@@ -1,12 +1,15 @@
 //! Spectra of the compared parameterizations; one row per singular value or weight of a direction.
 
-use super::LaboratoryPanel;
+use super::{LaboratoryPanel, LaboratoryView};
 use crate::flight_log::csv_writer::{CsvWriter, number_cell};
 use crate::gui::{CsvTable, PanelContext};
 
 impl CsvTable for LaboratoryPanel {
-    /// Singular values and directions of each parameterization.
+    /// Singular values and directions of each parameterization, or σ after the planned motion.
     fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {
+        if self.view == LaboratoryView::Plan {
+            return self.plan.csv_table(ctx);
+        }
         let mut table = CsvWriter::new(["form", "kind", "number", "singular_value", "parameter", "weight"]);
         let names = ctx.names();
         for (parameterization, rank) in self.ranks(ctx) {

@@ -1,38 +1,68 @@
-//! Laboratory panel: observability of the parameters for a mechanism, its parameterizations and a motion, without a
-//! log.
+//! Laboratory panel: observability of the parameters for a mechanism, its parameterizations and a motion without a log,
+//! and a planned motion with the σ that it leaves.
 //!
-//! The experiments are those of `dcvins degeneracy`.
+//! The experiments are those of `dcvins degeneracy`, the planned motions those of `dcvins plan`.
 
 mod choices;
 mod csv;
+mod plan;
+mod request;
 #[cfg(test)]
 mod tests;
 mod worker;
 
 use egui::{Color32, Label, RichText, ScrollArea, Ui};
 
+pub use self::request::MotionRequest;
+
 use self::choices::Choices;
+use self::plan::PlanView;
 use self::worker::Worker;
 use super::help::terms::window;
 use super::rank::columns::{RankColumn, columns_ui};
 use super::{Panel, PanelContext};
 use crate::observability::RankReport;
 use crate::observability::laboratory::{LaboratoryReport, LaboratoryResult};
+use crate::simulation::PrescribedMotion;
 use crate::text::Named as _;
+
+/// Content of the laboratory panel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum LaboratoryView {
+    /// A listed motion with several parameterizations.
+    #[default]
+    Experiment,
+    /// A motion that is edited.
+    Plan,
+}
 
 /// State of the laboratory panel: choices and results.
 #[derive(Default)]
 pub struct LaboratoryPanel {
     /// True if experiments run on another thread, as in the window; screenshots wait for them.
     pub in_background: bool,
+    view: LaboratoryView,
     choices: Choices,
     worker: Worker,
+    plan: PlanView,
 }
 
 impl Panel for LaboratoryPanel {
     fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
             ui.spacing_mut().item_spacing.y = 3.0;
+            if !ctx.presentation.is_figure() {
+                ui.horizontal(|ui| {
+                    ui.selectable_value(&mut self.view, LaboratoryView::Experiment, "Listed motion")
+                        .on_hover_text("Ranks of several parameterizations with a listed motion");
+                    ui.selectable_value(&mut self.view, LaboratoryView::Plan, "Planned motion")
+                        .on_hover_text("σ of the selected run's parameters after a motion whose curves are dragged");
+                });
+            }
+            if self.view == LaboratoryView::Plan {
+                self.plan.ui(ui, ctx, self.in_background);
+                return;
+            }
             if ctx.presentation.is_figure() {
                 self.choices.summary_ui(ui, ctx);
             } else {
@@ -74,11 +104,28 @@ impl Panel for LaboratoryPanel {
     }
 
     fn view_copy(&self) -> Self {
-        Self { in_background: false, choices: self.choices.clone(), worker: Worker::default() }
+        Self {
+            in_background: false,
+            view: self.view,
+            choices: self.choices.clone(),
+            worker: Worker::default(),
+            plan: self.plan.view_copy(),
+        }
     }
 }
 
 impl LaboratoryPanel {
+    /// Shows a motion as the planned one.
+    pub fn open_motion(&mut self, motion: PrescribedMotion) {
+        self.view = LaboratoryView::Plan;
+        self.plan.open(motion);
+    }
+
+    /// Request about a file since the last call.
+    pub(in crate::gui) fn take_request(&mut self) -> Option<MotionRequest> {
+        self.plan.request.take()
+    }
+
     /// The chosen parameterizations with their rank reports; waits for missing results.
     pub(in crate::gui) fn ranks(&mut self, ctx: &PanelContext<'_>) -> Vec<(String, RankReport)> {
         if let Ok(experiment) = self.choices.experiment(ctx) {

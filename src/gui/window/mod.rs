@@ -141,6 +141,7 @@ pub fn window_ui(ui: &mut Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>
         state.help.toggle(ui.ctx(), panel);
     }
     actions.extend(state.panels.comparison.asked.take().map(Action::Dialog));
+    state.requests.extend(state.panels.laboratory.take_request().map(WindowRequest::Motion));
 
     dialogs::ui(ui, state, ctx, &mut actions);
     shortcuts::ui(ui, &theme, &mut state.shortcuts_open);

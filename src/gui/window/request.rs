@@ -3,9 +3,10 @@
 use std::path::PathBuf;
 
 use crate::gui::desktop::{FigureExport, PanelExport};
+use crate::gui::laboratory::MotionRequest;
 
 /// Request of the window to the application, in addition to the commands of a session.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum WindowRequest {
     /// Open a log, or the files of one log together.
     OpenLog(Vec<PathBuf>),
@@ -24,6 +25,8 @@ pub enum WindowRequest {
     },
     WritePanel(Box<PanelExport>),
     WriteFigure(Box<FigureExport>),
+    /// Write or read the file of a planned motion.
+    Motion(MotionRequest),
     /// Write a report on the runs of the open log and open it.
     WriteReport,
 }
