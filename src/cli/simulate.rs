@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::{Args, ValueEnum};
 use dcvins::export;
+use dcvins::sensors::Rig;
 use dcvins::simulation::{self, Disturbances, Experiment, SimulationError, SimulationOptions, WorldKind};
 use dcvins::text::key_list;
 
@@ -62,6 +63,10 @@ pub(crate) struct SimulateArguments {
     /// `x_m` (forward), `y_m` (left), `z_m` (up), `heading_rad`; `dcvins plan` writes one.
     #[arg(long, value_name = "FILE.csv", conflicts_with = "mirror")]
     pub motion: Option<PathBuf>,
+    /// Fly a motion with the mechanism, cameras and noise of this rig. Its chain is the ground truth; the chain of the
+    /// written rig has random errors within its prior.
+    #[arg(long, value_name = "FILE", requires = "motion", conflicts_with_all = ["size", "rate", "gimbal_imu"])]
+    pub rig: Option<PathBuf>,
     #[arg(long, value_name = "KEY=VALUE[,VALUE…]", help = disturb_help())]
     pub disturb: Vec<String>,
 }
@@ -128,6 +133,9 @@ pub(crate) fn simulate(arguments: &SimulateArguments) -> Result<ExitOutcome> {
         ExperimentArgument::T4 => Experiment::T4,
     };
     let mut options = SimulationOptions::new(experiment);
+    if let Some(path) = &arguments.rig {
+        options = options.with_rig(Rig::from_file(path)?);
+    }
     options.world = match arguments.world {
         WorldArgument::Textured => WorldKind::Textured,
         WorldArgument::Plain => WorldKind::Plain,

@@ -18,6 +18,8 @@ use crate::text::Named;
 pub(crate) const GRAVITY_M_PER_S2: f64 = 9.81;
 /// Rate of the IMU and of the encoders.
 pub(crate) const IMU_RATE_HZ: f64 = 200.0;
+/// Topic of the encoders.
+pub(crate) const JOINT_TOPIC: &str = "/gimbal/joint_states";
 /// Image size of the intrinsics below.
 const NOMINAL_SIZE_PX: [usize; 2] = [640, 480];
 
@@ -97,7 +99,7 @@ impl Equipment {
             }
         }
         let gimbal = self.gimbal_camera.then(|| GimbalRig {
-            topic: self.encoder_sigma_rad.map(|_| "/gimbal/joint_states".to_owned()),
+            topic: self.encoder_sigma_rad.map(|_| JOINT_TOPIC.to_owned()),
             attitude: None,
             use_log_time: false,
             timeshift_gimbal_imu_s: 0.0,

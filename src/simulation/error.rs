@@ -35,6 +35,9 @@ pub enum SimulationError {
     /// A prescribed motion that the vehicle or its gimbal cannot follow.
     #[error("the motion cannot be flown: {problem}")]
     Motion { problem: String },
+    /// A rig that the simulation does not cover.
+    #[error("the rig '{rig}' cannot be simulated: {problem}")]
+    Rig { rig: String, problem: String },
     /// The caller stopped the conversion.
     #[error("interrupted after {images_done} of {images_total} images; nothing is written")]
     Interrupted {

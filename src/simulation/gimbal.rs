@@ -10,7 +10,7 @@ use super::route::Wave;
 use super::trajectory::{Kinematics, Trajectory};
 use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::{ClassicalChain, DhLink};
-use crate::sensors::Joint;
+use crate::sensors::{GimbalRig, Joint};
 
 /// Joints of the paper's gimbal (§5.1): yaw ±180°, roll ±25°, pitch −120° to 30°.
 pub(crate) fn joints() -> Vec<Joint> {
@@ -158,8 +158,9 @@ const CONTROL_STEP_S: f64 = 0.001;
 /// True joint angles over a flight.
 #[derive(Clone, Debug)]
 pub struct JointMotion {
-    /// Angle and rate of each joint per control step.
-    states: Vec<([f64; 3], [f64; 3])>,
+    joints: usize,
+    /// Angles and rates at each control step, joint by joint.
+    states: Vec<[f64; 2]>,
 }
 
 impl JointMotion {
@@ -176,7 +177,7 @@ impl JointMotion {
         let mut followed_rad = look.heading_to_follow_rad(&trajectory.at(0.0), 0.0);
         let mut angles = start_angles(trajectory, chain, look, followed_rad);
         let mut rates = [0.0; 3];
-        let mut states = Vec::with_capacity(steps);
+        let mut states = Vec::with_capacity(3 * steps);
         let mut kept: Option<UnitQuaternion<f64>> = None;
         for step in 0..steps {
             let time_s = step as f64 * CONTROL_STEP_S;
@@ -188,7 +189,7 @@ impl JointMotion {
                 keep(&rotation, chain, joints, wanted, &mut angles);
                 rates = std::array::from_fn(|k| (angles[k] - before[k]) / CONTROL_STEP_S);
             }
-            states.push((angles, rates));
+            states.extend((0..3).map(|k| [angles[k], rates[k]]));
             followed_rad +=
                 (look.heading_to_follow_rad(&vehicle, time_s) - followed_rad) * (CONTROL_STEP_S / stabilizer.follow_s);
             let wanted = look.orientation(followed_rad, time_s);
@@ -209,25 +210,31 @@ impl JointMotion {
                 angles[k] = (angles[k] + rates[k] * CONTROL_STEP_S).clamp(low, high);
             }
         }
-        Self { states }
+        Self { joints: 3, states }
     }
 
-    /// Joints that follow prescribed angles; `at` returns angles and rates at a time in seconds.
-    pub(crate) fn prescribed(duration_s: f64, at: impl Fn(f64) -> ([f64; 3], [f64; 3])) -> Self {
+    /// Motion of a gimbal with three joints that stabilizes its camera.
+    pub(crate) fn stabilized(trajectory: &Trajectory, gimbal: &GimbalRig, look: &LookAround) -> Self {
+        Self::simulate(trajectory, &gimbal.chain, &gimbal.joints, look, &Stabilizer::default())
+    }
+
+    /// Joints that follow prescribed angles; `at` returns angle and rate of a joint at a time in seconds.
+    pub(crate) fn prescribed(joints: usize, duration_s: f64, at: impl Fn(usize, f64) -> [f64; 2]) -> Self {
         let steps = (duration_s / CONTROL_STEP_S).ceil() as usize + 2;
-        Self { states: (0..steps).map(|step| at(step as f64 * CONTROL_STEP_S)).collect() }
+        let states = (0..steps).flat_map(|step| (0..joints).map(move |joint| (joint, step as f64 * CONTROL_STEP_S)));
+        Self { joints, states: states.map(|(joint, time_s)| at(joint, time_s)).collect() }
     }
 
     /// Fixes the joints from a time on, except for the swing of an exercise within the joint limits.
     pub(crate) fn exercise_from(&mut self, start_s: f64, exercise: &Exercise, joints: &[Joint]) {
-        let first = ((start_s / CONTROL_STEP_S).ceil() as usize).min(self.states.len() - 1);
-        let fixed = self.states[first].0;
-        for (step, (angles, rates)) in self.states.iter_mut().enumerate().skip(first) {
+        let first = ((start_s / CONTROL_STEP_S).ceil() as usize).min(self.steps() - 1);
+        let fixed = self.states[first * self.joints..][..self.joints].to_vec();
+        for (step, states) in self.states.chunks_exact_mut(self.joints).enumerate().skip(first) {
             let time_s = (step - first) as f64 * CONTROL_STEP_S;
-            for (joint, (angle, rate)) in angles.iter_mut().zip(rates).enumerate() {
+            for (joint, [angle, rate]) in states.iter_mut().enumerate() {
                 let swung = |time_s: f64| {
                     let (low, high) = joints[joint].limits_rad;
-                    (fixed[joint] + exercise.joint_rad(joint, time_s)).clamp(low, high)
+                    (fixed[joint][0] + exercise.joint_rad(joint, time_s)).clamp(low, high)
                 };
                 *angle = swung(time_s);
                 *rate = (swung(time_s + CONTROL_STEP_S) - swung(time_s - CONTROL_STEP_S)) / (2.0 * CONTROL_STEP_S);
@@ -235,20 +242,28 @@ impl JointMotion {
         }
     }
 
+    fn steps(&self) -> usize {
+        self.states.len() / self.joints.max(1)
+    }
+
     /// True joint angles at a time, by cubic interpolation between control steps.
-    pub fn at(&self, time_s: f64) -> [f64; 3] {
-        let last = self.states.len() - 1;
+    pub fn at(&self, time_s: f64) -> Vec<f64> {
+        if self.joints == 0 {
+            return Vec::new();
+        }
+        let last = self.steps() - 1;
         let position = (time_s / CONTROL_STEP_S).clamp(0.0, last as f64);
         let before = (position as usize).min(last - 1);
         let u = position - before as f64;
-        let ((from, from_rate), (to, to_rate)) = (&self.states[before], &self.states[before + 1]);
+        let (from, to) = self.states[before * self.joints..][..2 * self.joints].split_at(self.joints);
         let (u2, u3) = (u * u, u * u * u);
-        std::array::from_fn(|k| {
-            (2.0 * u3 - 3.0 * u2 + 1.0) * from[k]
-                + (u3 - 2.0 * u2 + u) * CONTROL_STEP_S * from_rate[k]
-                + (3.0 * u2 - 2.0 * u3) * to[k]
-                + (u3 - u2) * CONTROL_STEP_S * to_rate[k]
-        })
+        let angle_rad = |([from, from_rate], [to, to_rate]): (&[f64; 2], &[f64; 2])| {
+            (2.0 * u3 - 3.0 * u2 + 1.0) * from
+                + (u3 - 2.0 * u2 + u) * CONTROL_STEP_S * from_rate
+                + (3.0 * u2 - 2.0 * u3) * to
+                + (u3 - u2) * CONTROL_STEP_S * to_rate
+        };
+        from.iter().zip(to).map(angle_rad).collect()
     }
 }
 

@@ -27,6 +27,8 @@ mod prescribed;
 mod random;
 #[cfg(feature = "logs")]
 mod render;
+#[cfg(feature = "logs")]
+mod rig_of_file;
 mod route;
 mod scenario;
 #[cfg(feature = "logs")]

@@ -5,7 +5,7 @@ use super::equipment::Lens;
 use super::error::SimulationError;
 use super::experiment::{Experiment, WorldKind};
 use super::motion_samples::PrescribedMotion;
-use crate::sensors::ChainPrior;
+use crate::sensors::{ChainPrior, Rig};
 
 /// Flight and sensors of a simulation; [`SimulationOptions::new`] gives an experiment of the paper.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,6 +43,8 @@ pub struct SimulationOptions {
     pub disturbances: Disturbances,
     /// Motion that replaces the experiment's, relative to the start of its route; `None` for the experiment's.
     pub motion: Option<PrescribedMotion>,
+    /// True rig that replaces the firefly's, with its own cameras; it needs a motion ([`Self::with_rig`]).
+    pub rig: Option<Rig>,
 }
 
 impl SimulationOptions {
@@ -67,6 +69,19 @@ impl SimulationOptions {
             jpeg_quality: 85,
             disturbances: Disturbances::default(),
             motion: None,
+            rig: None,
+        }
+    }
+
+    /// The same flight with another true rig: its encoders, and errors of the given chain within its prior.
+    #[must_use]
+    pub fn with_rig(self, rig: Rig) -> Self {
+        let gimbal = rig.gimbal.as_ref();
+        Self {
+            encoder_sigma_rad: gimbal.and_then(|gimbal| gimbal.encoder_sigma_rad),
+            start_error: gimbal.map_or(self.start_error, |gimbal| gimbal.prior),
+            rig: Some(rig),
+            ..self
         }
     }
 

@@ -6,11 +6,10 @@ use super::motion::MotionSplines;
 use super::motion_samples::PrescribedMotion;
 use super::options::SimulationOptions;
 use super::route::FlightPoint;
-use super::scenario::{Scenario, gravity_m_per_s2};
+use super::scenario::gravity_m_per_s2;
 use super::trajectory::{Trajectory, VehicleLimits};
+use crate::sensors::Joint;
 
-/// Number of joints of the simulated gimbal.
-const JOINTS: usize = 3;
 /// Angle by which a joint may exceed its stops, for rounding errors of the file.
 const TOLERANCE_RAD: f64 = 1e-6;
 
@@ -24,16 +23,10 @@ impl<'a> PrescribedFlight<'a> {
     /// Interpolates a motion between its rows.
     ///
     /// # Errors
-    /// If the motion has wrong times, values or joints, or a disturbance changes the motion too.
+    /// If the motion has wrong times or values, or a disturbance changes the motion too.
     pub(super) fn new(motion: &'a PrescribedMotion, options: &SimulationOptions) -> Result<Self, SimulationError> {
         let problem = |problem: String| SimulationError::Motion { problem };
         motion.check().map_err(problem)?;
-        if motion.joint_names.len() != JOINTS {
-            return Err(problem(format!(
-                "it has the joints {}, the simulated gimbal has yaw, roll and pitch",
-                if motion.joint_names.is_empty() { "none".to_owned() } else { motion.joint_names.join(", ") }
-            )));
-        }
         let disturbances = &options.disturbances;
         let changes_motion = [
             ("slew", disturbances.gimbal_slew_s.is_some()),
@@ -66,19 +59,24 @@ impl<'a> PrescribedFlight<'a> {
         Ok(trajectory)
     }
 
-    /// Motion of the joints.
+    /// Motion of the joints of a rig over a flight of this duration.
     ///
     /// # Errors
-    /// If the names are not those of the gimbal, or an angle is beyond a stop.
-    pub(super) fn joints(&self, scenario: &Scenario) -> Result<JointMotion, SimulationError> {
+    /// If the names are not those of the rig, or an angle is beyond a stop.
+    pub(super) fn joints(&self, joints: &[Joint], duration_s: f64) -> Result<JointMotion, SimulationError> {
         let problem = |problem: String| SimulationError::Motion { problem };
-        let joints = scenario.true_rig.gimbal.as_ref().map_or(&[][..], |gimbal| gimbal.joints.as_slice());
-        let mut channels = [0; JOINTS];
-        for (channel, joint) in channels.iter_mut().zip(joints) {
-            let found = self.motion.joint_names.iter().position(|name| *name == joint.name);
-            *channel = found.ok_or_else(|| {
-                problem(format!("it has no joint '{}', only {}", joint.name, self.motion.joint_names.join(", ")))
-            })?;
+        let list = |names: &[String]| if names.is_empty() { "no joint".to_owned() } else { names.join(", ") };
+        let given = &self.motion.joint_names;
+        let mut channels = Vec::with_capacity(joints.len());
+        for joint in joints {
+            let channel = given.iter().position(|name| *name == joint.name);
+            channels.extend(channel);
+        }
+        if channels.len() != joints.len() || given.len() != joints.len() {
+            let names: Vec<String> = joints.iter().map(|joint| joint.name.clone()).collect();
+            return Err(problem(format!("it moves {}, the rig has {}", list(given), list(&names))));
+        }
+        for (channel, joint) in channels.iter().zip(joints) {
             for sample in &self.motion.samples {
                 let angle_rad = sample.joints_rad[*channel];
                 let (low, high) = joint.limits_rad;
@@ -95,10 +93,8 @@ impl<'a> PrescribedFlight<'a> {
             }
         }
         let end_s = self.splines.duration_s();
-        Ok(JointMotion::prescribed(scenario.trajectory.duration_s(), |time_s| {
-            let time_s = time_s.min(end_s);
-            let values = |order: usize| channels.map(|channel| self.splines.value(channel, time_s, order));
-            (values(0), values(1))
+        Ok(JointMotion::prescribed(joints.len(), duration_s, |joint, time_s| {
+            [0, 1].map(|order| self.splines.value(channels[joint], time_s.min(end_s), order))
         }))
     }
 }

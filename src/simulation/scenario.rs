@@ -1,12 +1,12 @@
 //! Flight with its rig and the measurements of all sensors except the cameras.
 
-use super::equipment::{Equipment, GRAVITY_M_PER_S2, IMU_RATE_HZ, IntrinsicsError, given_rig, random_imu_intrinsics};
-use super::gimbal::{JointMotion, LookAround, Stabilizer};
-use super::imu::{FIREFLY_IMU, ImuRecord};
+use super::equipment::{GRAVITY_M_PER_S2, IntrinsicsError, given_rig, random_imu_intrinsics};
+use super::gimbal::JointMotion;
+use super::imu::ImuRecord;
 use super::random::RandomStream;
 use super::trajectory::Trajectory;
 use crate::geometry::{RigidTransform, ns_from_seconds, seconds_from_ns};
-use crate::sensors::{CameraMount, CameraRig, ChainPrior, JointSample, Rig};
+use crate::sensors::{CameraMount, CameraRig, ChainPrior, GimbalRig, JointSample, Rig};
 
 /// Streams of random numbers, one per purpose, so that they are independent.
 pub(crate) mod stream {
@@ -45,28 +45,31 @@ pub(crate) struct Scenario {
 }
 
 /// Options of a scenario in addition to its trajectory.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct ScenarioOptions<'a> {
-    pub(crate) name: &'a str,
+#[derive(Clone, Debug)]
+pub(crate) struct ScenarioOptions {
     pub(crate) seed: u64,
-    pub(crate) equipment: Equipment,
+    pub(crate) true_rig: Rig,
     pub(crate) start_error: ChainPrior,
     pub(crate) imu_noise_scale: f64,
 }
 
 impl Scenario {
     /// Simulates gimbal and sensors along a trajectory.
-    pub(crate) fn new(trajectory: Trajectory, look: &LookAround, options: &ScenarioOptions<'_>) -> Self {
+    ///
+    /// `joints` moves them along the trajectory; it is not called for a rig without a gimbal.
+    pub(crate) fn new(
+        trajectory: Trajectory,
+        joints: impl FnOnce(&Trajectory, &GimbalRig) -> JointMotion,
+        options: ScenarioOptions,
+    ) -> Self {
         let random = |stream| RandomStream::new(options.seed, stream);
-        let true_rig = options.equipment.true_rig(options.name, &mut random(stream::RIG));
+        let true_rig = options.true_rig;
         let given_rig = given_rig(&true_rig, options.start_error, &mut random(stream::GIVEN_RIG));
-        let joints = true_rig.gimbal.as_ref().map(|gimbal| {
-            JointMotion::simulate(&trajectory, &gimbal.chain, &gimbal.joints, look, &Stabilizer::default())
-        });
+        let joints = true_rig.gimbal.as_ref().map(|gimbal| joints(&trajectory, gimbal));
         let imu_record = ImuRecord::measure(
             &trajectory,
-            &FIREFLY_IMU,
-            IMU_RATE_HZ,
+            &true_rig.imu.noise,
+            true_rig.imu.rate_hz,
             options.imu_noise_scale,
             &mut random(stream::IMU),
         );
@@ -102,17 +105,17 @@ impl Scenario {
 
     /// True joint angles at a time.
     pub(crate) fn joint_angles_rad(&self, time_s: f64) -> Option<Vec<f64>> {
-        self.joints.as_ref().map(|joints| joints.at(time_s).to_vec())
+        self.joints.as_ref().map(|joints| joints.at(time_s))
     }
 
     /// True joint angles at the encoders' stamps.
     pub(crate) fn true_joint_samples(&self) -> Vec<JointSample> {
-        let Some(joints) = &self.joints else { return Vec::new() };
-        let duration_s = self.trajectory.duration_s();
-        let count = ((duration_s - ENCODER_PHASE_S) * IMU_RATE_HZ).floor().max(0.0) as usize + 1;
+        let (Some(joints), Some(gimbal)) = (&self.joints, &self.true_rig.gimbal) else { return Vec::new() };
+        let (duration_s, rate_hz) = (self.trajectory.duration_s(), gimbal.rate_hz);
+        let count = ((duration_s - ENCODER_PHASE_S) * rate_hz).floor().max(0.0) as usize + 1;
         (0..count)
-            .map(|index| ns_from_seconds(index as f64 / IMU_RATE_HZ + ENCODER_PHASE_S))
-            .map(|stamp_ns| JointSample { stamp_ns, angles_rad: joints.at(seconds_from_ns(stamp_ns)).to_vec() })
+            .map(|index| ns_from_seconds(index as f64 / rate_hz + ENCODER_PHASE_S))
+            .map(|stamp_ns| JointSample { stamp_ns, angles_rad: joints.at(seconds_from_ns(stamp_ns)) })
             .collect()
     }
 

@@ -11,14 +11,16 @@ use rayon::prelude::*;
 
 use super::aim::Aimed;
 use super::disturbances::{EXPOSURE_DRIFT, VIGNETTING};
-use super::equipment::{Equipment, IntrinsicsError};
+use super::equipment::{Equipment, IntrinsicsError, JOINT_TOPIC};
 use super::error::SimulationError;
 use super::experiment::{Experiment, WorldKind};
+use super::gimbal::JointMotion;
 use super::interval::during;
 use super::options::{SimulationOptions, SimulationProgress, SimulationSummary};
 use super::prescribed::PrescribedFlight;
 use super::random::RandomStream;
 use super::render::{RenderedView, Sensor, SensorOptions, SurfaceShader, Workspace};
+use super::rig_of_file::rig_as_truth;
 use super::route::Mirrored;
 use super::scenario::{Scenario, ScenarioOptions, gravity_m_per_s2, stream};
 use super::trajectory::{AIR_DRAG_PER_S, Trajectory, VehicleLimits};
@@ -27,7 +29,7 @@ use super::world;
 use crate::flight_log::output::OutputSet;
 use crate::flight_log::{LogError, LogWriter, LogWriterOptions, MessageTimes, Odometry};
 use crate::geometry::{ns_from_seconds, seconds_from_ns, so3};
-use crate::sensors::{CameraRig, ImuRig, ImuSample, JointSample};
+use crate::sensors::{CameraRig, GimbalRig, ImuRig, ImuSample, JointSample, Rig};
 use crate::text::Named as _;
 
 /// Start of simulated logs: 15 June 2025, 15:06:40 UTC.
@@ -163,30 +165,21 @@ fn fly_scenario(options: &SimulationOptions, name: &str) -> Result<Scenario, Sim
         // Checked to be 1 to 3.
         (joint.round() as usize - 1, [start_s, length_s])
     });
+    let trajectory = trajectory.cut(end_s);
+    let true_rig = true_rig(options, name)?;
+    let joints = true_rig.gimbal.as_ref().map_or(&[][..], |gimbal| gimbal.joints.as_slice());
+    let joints = prescribed.map(|prescribed| prescribed.joints(joints, trajectory.duration_s())).transpose()?;
+    let stabilized = |trajectory: &Trajectory, gimbal: &GimbalRig| JointMotion::stabilized(trajectory, gimbal, &look);
     let mut scenario = Scenario::new(
-        trajectory.cut(end_s),
-        &look,
-        &ScenarioOptions {
-            name,
+        trajectory,
+        |trajectory, gimbal| joints.unwrap_or_else(|| stabilized(trajectory, gimbal)),
+        ScenarioOptions {
             seed: options.seed,
-            equipment: Equipment {
-                gimbal_camera: true,
-                static_camera: options.static_camera,
-                lens: options.lens,
-                resolution_px: options.resolution_px,
-                camera_rate_hz: options.camera_rate_hz,
-                camera_time_offset_s: options.disturbances.camera_time_offset_s,
-                readout_s: options.disturbances.readout_s,
-                encoder_sigma_rad: options.encoder_sigma_rad,
-                gimbal_imu: options.gimbal_imu_noise_scale.is_some(),
-            },
+            true_rig,
             start_error: options.start_error,
             imu_noise_scale: options.imu_noise_scale,
         },
     );
-    if let Some(prescribed) = &prescribed {
-        scenario.joints = Some(prescribed.joints(&scenario)?);
-    }
     if let Some(noise_scale) = options.gimbal_imu_noise_scale {
         scenario.measure_gimbal_imu(noise_scale);
         scenario.spoil_gimbal_imu(options.disturbances.gimbal_imu_error);
@@ -216,6 +209,25 @@ fn fly_scenario(options: &SimulationOptions, name: &str) -> Result<Scenario, Sim
         }
     }
     Ok(scenario)
+}
+
+/// True rig: the firefly's, whose errors are drawn, or that of a file.
+fn true_rig(options: &SimulationOptions, name: &str) -> Result<Rig, SimulationError> {
+    if let Some(rig) = &options.rig {
+        return rig_as_truth(rig, options, name);
+    }
+    let equipment = Equipment {
+        gimbal_camera: true,
+        static_camera: options.static_camera,
+        lens: options.lens,
+        resolution_px: options.resolution_px,
+        camera_rate_hz: options.camera_rate_hz,
+        camera_time_offset_s: options.disturbances.camera_time_offset_s,
+        readout_s: options.disturbances.readout_s,
+        encoder_sigma_rad: options.encoder_sigma_rad,
+        gimbal_imu: options.gimbal_imu_noise_scale.is_some(),
+    };
+    Ok(equipment.true_rig(name, &mut RandomStream::new(options.seed, stream::RIG)))
 }
 
 /// Message of the log by its index among those of its kind.
@@ -287,7 +299,8 @@ fn write_messages(
             Message::Joints(index) => {
                 let sample = &recordings.joints[index];
                 let stamp_ns = sample.stamp_ns + ns_from_seconds(options.disturbances.joint_lag_s);
-                log.write_joints("/gimbal/joint_states", times(stamp_ns), &joint_names, &sample.angles_rad)?;
+                let topic = rig.gimbal.as_ref().and_then(|gimbal| gimbal.topic.as_deref()).unwrap_or(JOINT_TOPIC);
+                log.write_joints(topic, times(stamp_ns), &joint_names, &sample.angles_rad)?;
             }
             Message::TrueJoints(index) => {
                 let sample = &recordings.true_joints[index];
@@ -301,7 +314,7 @@ fn write_messages(
                 }
                 let shot = recordings.shots[index];
                 let camera = &rig.cameras[shot.camera];
-                let info = camera.topic.replace("image_raw/compressed", "camera_info");
+                let info = camera_info_topic(&camera.topic);
                 let times = times(shot.stamp_ns);
                 // A camera publishes its given intrinsics, including their errors.
                 log.write_camera_info(&info, &camera.frame_id, times, &scenario.given_rig.cameras[shot.camera].model)?;
@@ -318,6 +331,12 @@ fn write_messages(
     Ok(done)
 }
 
+/// Topic of the intrinsics of a camera whose images have this topic.
+fn camera_info_topic(images: &str) -> String {
+    let beside = images.strip_suffix("image_raw/compressed").map(|parent| format!("{parent}camera_info"));
+    beside.unwrap_or_else(|| format!("{images}/camera_info"))
+}
+
 fn write_imu(log: &mut LogWriter, imu: &ImuRig, times: MessageTimes, sample: &ImuSample) -> Result<(), LogError> {
     let (rate, force) = (&sample.angular_velocity_rad_per_s, &sample.specific_force_m_per_s2);
     log.write_imu(&imu.topic, &imu.frame_id, times, rate, force)
@@ -332,8 +351,8 @@ fn recordings(options: &SimulationOptions, scenario: &Scenario) -> Recordings {
     // Earliest and latest exposure of a row, relative to the stamp.
     let rows_s = [options.disturbances.readout_s.min(0.0), options.disturbances.readout_s.max(0.0)];
     let mut shots = Vec::new();
-    for (camera, _) in scenario.true_rig.cameras.iter().enumerate() {
-        let period_s = 1.0 / options.camera_rate_hz;
+    for (camera, rig) in scenario.true_rig.cameras.iter().enumerate() {
+        let period_s = 1.0 / rig.rate_hz;
         let mut frame_index = 0;
         loop {
             let stamp_s = FIRST_IMAGE_S + frame_index as f64 * period_s;

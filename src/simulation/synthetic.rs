@@ -7,7 +7,7 @@ use nalgebra::{Vector2, Vector3};
 use super::equipment::{Equipment, IntrinsicsError, Lens};
 use super::exercise::Exercise;
 use super::experiment::Experiment;
-use super::gimbal::LookAround;
+use super::gimbal::{JointMotion, LookAround};
 use super::imu::SimulatedBias;
 use super::random::RandomStream;
 use super::route::{Drill, Flight, Manoeuvres, Station};
@@ -189,11 +189,10 @@ pub fn synthetic_tracks(options: &SyntheticOptions) -> SyntheticFlight {
     );
     let mut scenario = Scenario::new(
         trajectory(options),
-        &look,
-        &ScenarioOptions {
-            name: "synthetic",
+        |trajectory, gimbal| JointMotion::stabilized(trajectory, gimbal, &look),
+        ScenarioOptions {
             seed: options.seed,
-            equipment,
+            true_rig: equipment.true_rig("synthetic", &mut RandomStream::new(options.seed, stream::RIG)),
             start_error: options.start_error,
             imu_noise_scale: options.imu_noise_scale,
         },

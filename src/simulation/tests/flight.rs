@@ -11,6 +11,7 @@ use super::super::spline::Spline;
 use super::super::trajectory::{Trajectory, VehicleLimits};
 use super::super::vibration::{Vibration, shake};
 use crate::geometry::so3;
+use crate::sensors::GimbalRig;
 use crate::text::Named as _;
 
 pub(super) fn experiment_trajectory(experiment: Experiment, seed: u64, duration_s: f64) -> Trajectory {
@@ -33,9 +34,10 @@ pub(super) fn experiment_scenario(experiment: Experiment, seed: u64, duration_s:
         encoder_sigma_rad: gimbal_camera.then_some(0.01),
         gimbal_imu: false,
     };
-    let options =
-        ScenarioOptions { name: "test", seed, equipment, start_error: experiment.start_error(), imu_noise_scale: 1.0 };
-    Scenario::new(experiment_trajectory(experiment, seed, duration_s), &look, &options)
+    let true_rig = equipment.true_rig("test", &mut RandomStream::new(seed, stream::RIG));
+    let options = ScenarioOptions { seed, true_rig, start_error: experiment.start_error(), imu_noise_scale: 1.0 };
+    let joints = |trajectory: &Trajectory, gimbal: &GimbalRig| JointMotion::stabilized(trajectory, gimbal, &look);
+    Scenario::new(experiment_trajectory(experiment, seed, duration_s), joints, options)
 }
 
 #[test]

@@ -1,13 +1,14 @@
 //! Flights along a prescribed motion.
 
+use std::path::Path;
 use std::sync::Arc;
 
 use super::super::{
     Experiment, MotionSplines, PrescribedMotion, SimulationError, SimulationOptions, SimulationSummary, simulate,
 };
 use crate::flight_log::{FlightLog, FrameStream};
-use crate::geometry::{seconds_from_ns, so3};
-use crate::sensors::Rig;
+use crate::geometry::{RigidTransform, seconds_from_ns, so3};
+use crate::sensors::{CameraMount, Rig};
 
 /// A motion of two seconds with a heading, a translation and a swing of the pitch joint.
 fn motion() -> PrescribedMotion {
@@ -83,16 +84,96 @@ fn motions_beyond_the_vehicle_and_its_gimbal_are_rejected() {
         let problem = fly(change).unwrap_err().to_string();
         assert!(problem.contains(words), "{problem}");
     };
-    check(|_, motion| motion.joint_names[1] = "tilt".to_owned(), "no joint 'roll'");
+    check(
+        |_, motion| motion.joint_names[1] = "tilt".to_owned(),
+        "it moves yaw, tilt, pitch, the rig has yaw, roll, pitch",
+    );
     check(
         |_, motion| {
             motion.joint_names.pop();
             motion.samples.iter_mut().for_each(|sample| sample.joints_rad.truncate(2));
         },
-        "yaw, roll and pitch",
+        "it moves yaw, roll, the rig has yaw, roll, pitch",
     );
     check(|_, motion| motion.samples[20].joints_rad[1] = 0.6, "the joint 'roll' is at 34.4°, its range is -25° to 25°");
     check(|_, motion| motion.samples[20].position_m.x = 30.0, "the vehicle would exceed 7 m/s");
     check(|_, motion| motion.samples[3].time_s = 0.1, "after 0.200 s is 0.100 s");
     check(|options, _| options.disturbances.set("hover=1,1").unwrap(), "the disturbance 'hover'");
+}
+
+/// Rig of a test file and a motion of its joints, one swing each.
+fn mechanism(name: &str) -> (Rig, PrescribedMotion) {
+    let rig = Rig::from_file(Path::new(&format!("{}/tests/data/{name}.rig.yaml", env!("CARGO_MANIFEST_DIR")))).unwrap();
+    let mut splines = MotionSplines::at_rest(&vec![0.1; rig.joint_names().len()], 4.0, 16);
+    for index in splines.free_points() {
+        for joint in 0..splines.joint_count() {
+            let swing = (0.5 * index as f64 + joint as f64).sin();
+            splines.set_point(joint, index, 0.1 + 0.2 * swing);
+        }
+    }
+    let samples = (0..=40).map(|step| splines.sample(0.1 * f64::from(step))).collect();
+    (rig.clone(), PrescribedMotion { joint_names: rig.joint_names(), samples })
+}
+
+#[test]
+fn a_motion_is_flown_with_the_mechanism_of_a_rig() {
+    for (name, joints) in [("pan_tilt", 2), ("wrist_arm", 5)] {
+        let folder = tempfile::tempdir().unwrap();
+        let (mut rig, prescribed) = mechanism(name);
+        rig.cameras[0].model.resolution_px = [32, 24];
+        rig.cameras[0].model.intrinsics_px = [23.0, 23.0, 15.5, 11.5];
+        let options = SimulationOptions { motion: Some(prescribed), ..SimulationOptions::new(Experiment::T2) };
+        let options = SimulationOptions { imu_noise_scale: 0.0, ..options.with_rig(rig.clone()) };
+        let summary = simulate(&options, &folder.path().join("flight.mcap"), &mut |_| ()).unwrap();
+        let (given, truth) = (Rig::from_file(&summary.rig).unwrap(), Rig::from_file(&summary.ground_truth).unwrap());
+        let [file, given_gimbal, true_gimbal] = [&rig, &given, &truth].map(|rig| rig.gimbal.as_ref().unwrap());
+        assert_eq!((true_gimbal.joints.len(), &true_gimbal.joints), (joints, &file.joints));
+        assert_eq!(given_gimbal.prior, file.prior);
+        for (link, (given, truth)) in given_gimbal.chain.links.iter().zip(&true_gimbal.chain.links).enumerate() {
+            assert!((truth.alpha_rad - file.chain.links[link].alpha_rad).abs() < 1e-9, "{name}");
+            let error = (given.d_m - truth.d_m).abs();
+            assert!(error > 1e-6 && error <= file.prior.translation_bound_m, "{name}: {error}");
+        }
+        assert_eq!(given.cameras[0].model.resolution_px, [32, 24]);
+        let log = Arc::new(FlightLog::open(&summary.log).unwrap());
+        let frames: Vec<_> = FrameStream::new(log, &given, "cam0", 0.0, None).unwrap().collect();
+        assert_eq!(frames.len(), 80);
+        let expected = MotionSplines::through(options.motion.as_ref().unwrap());
+        for frame in &frames {
+            let wanted = expected.joints_rad(seconds_from_ns(frame.stamp_ns));
+            let angles = frame.joint_angles.as_ref().unwrap();
+            for (angle, wanted) in angles.angles_rad.iter().zip(&wanted) {
+                // Encoders of 0.5°, ten readings per frame.
+                assert!((angle - wanted).abs() < 0.03, "{angles:?} {wanted:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_rig_beyond_the_simulation_is_rejected_with_its_reason() {
+    let check = |change: fn(&mut SimulationOptions, &mut Rig), words: &str| {
+        let folder = tempfile::tempdir().unwrap();
+        let (mut rig, prescribed) = mechanism("pan_tilt");
+        let mut options = SimulationOptions { motion: Some(prescribed), ..SimulationOptions::new(Experiment::T2) };
+        change(&mut options, &mut rig);
+        let output = folder.path().join("flight.mcap");
+        let problem = simulate(&options.with_rig(rig), &output, &mut |_| ()).unwrap_err().to_string();
+        assert!(problem.contains("the rig 'pan_tilt' cannot be simulated") && problem.contains(words), "{problem}");
+        assert!(!output.exists());
+    };
+    check(|options, _| options.motion = None, "give a motion");
+    check(|options, _| options.gimbal_imu_noise_scale = Some(1.0), "omit imu1");
+    check(|_, rig| rig.imu.accelerometer_topic = Some("/accelerometer".to_owned()), "two topics");
+    check(|_, rig| rig.imu.use_log_time = true, "header stamps");
+    check(|_, rig| rig.cameras[0].timeshift_cam_imu_s = 0.01, "--disturb camera-offset");
+    check(|_, rig| rig.cameras[0].model.intrinsics_px[0] = 50.0, "cam0 sees rays 8");
+    check(|_, rig| rig.gimbal.as_mut().unwrap().timeshift_gimbal_imu_s = 0.01, "--disturb joint-lag");
+    check(
+        |options, rig| {
+            options.static_camera = false;
+            rig.cameras[0].mount = CameraMount::Static { imu_from_camera: RigidTransform::identity() };
+        },
+        "no camera on the gimbal",
+    );
 }
