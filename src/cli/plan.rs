@@ -24,7 +24,7 @@ pub(crate) struct PlanArguments {
     /// The rig; its prior is the uncertainty before the motion.
     #[arg(value_name = "RIG")]
     pub rig: PathBuf,
-    /// Folder for plan.json, plan.txt, sigma.csv and motion.csv.
+    /// Folder for plan.json, plan.txt, sigma.csv, motion.csv and listed.csv.
     #[arg(short = 'o', long, visible_alias = "output", value_name = "DIR")]
     pub out: PathBuf,
     /// The run that will estimate the calibration, as for `dcvins run`: NAME[:key=value,…].

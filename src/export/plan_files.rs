@@ -1,4 +1,4 @@
-//! Files of a planned motion: `plan.json`, `plan.txt`, `sigma.csv` and, for a searched motion, `motion.csv`.
+//! Files of a planned motion: `plan.json`, `plan.txt`, `sigma.csv`, `motion.csv` and, for a searched motion, `listed.csv`.
 
 use std::fmt::{self, Display, Formatter};
 use std::path::{Path, PathBuf};
@@ -12,12 +12,15 @@ use super::motion_csv::motion_csv;
 use crate::flight_log::csv_writer::{CsvWriter, number_cell};
 use crate::flight_log::{output, printable, shortened};
 use crate::observability::laboratory::{HandPlan, MotionPlan, PlanTable, SigmaRow};
+use crate::simulation::MotionSplines;
 
 const INDEX: &str = "plan.json";
 const TEXT: &str = "plan.txt";
 const SIGMAS: &str = "sigma.csv";
 const MOTION: &str = "motion.csv";
-const PLAN_FILES: [&str; 4] = [INDEX, TEXT, SIGMAS, MOTION];
+/// Best listed motion, repeated.
+const LISTED: &str = "listed.csv";
+const PLAN_FILES: [&str; 5] = [INDEX, TEXT, SIGMAS, MOTION, LISTED];
 /// Key of the index whose value names the rig.
 const RIG_KEY: &str = "rig";
 
@@ -49,6 +52,13 @@ impl PlannedFlight {
         match self {
             Self::Motion(plan) => &plan.table,
             Self::ByHand(plan) => &plan.table,
+        }
+    }
+
+    fn motion(&self) -> &MotionSplines {
+        match self {
+            Self::Motion(plan) => &plan.motion,
+            Self::ByHand(plan) => &plan.motion,
         }
     }
 
@@ -100,7 +110,8 @@ pub fn check_plan_folder(folder: &Path, rig: &str, force: bool) -> Result<(), Ex
     Err(ExportError::Existing { problem, path: folder.to_owned() })
 }
 
-/// Writes the files of a plan and returns their paths; the motion of an earlier plan is removed if this one has none.
+/// Writes the files of a plan and returns their paths; the listed motion of an earlier plan is removed if this one has
+/// none.
 ///
 /// # Errors
 /// If the folder or a file cannot be written.
@@ -112,11 +123,12 @@ pub fn write_plan(report: &PlanReport, joint_names: &[String], folder: &Path) ->
         (TEXT, report.to_string()),
         (SIGMAS, sigma_csv(report.plan.table(), report.plan.sigmas())),
     ];
+    files.push((MOTION, motion_csv(report.plan.motion(), joint_names)));
     if let PlannedFlight::Motion(plan) = &report.plan {
-        files.push((MOTION, motion_csv(&plan.motion, joint_names)));
+        files.extend(plan.listed.as_ref().map(|listed| (LISTED, motion_csv(&listed.motion, joint_names))));
     }
     let paths = write_files(files, folder)?;
-    remove_others(&[MOTION], &paths, folder)?;
+    remove_others(&[LISTED], &paths, folder)?;
     Ok(paths)
 }
 

@@ -58,7 +58,8 @@ pub use rig::{MissingSensors, RigCandidate, is_imu_file_of, is_rig_name, missing
 pub use sensor_frame::SensorFrame;
 pub use stills::{read_stills, read_stills_chain};
 pub use stream::{
-    FrameStream, RecordedImage, SensorSamples, ground_truth_poses, imu_samples, joint_samples, recorded_images,
+    FrameStream, RecordedImage, SensorSamples, ground_truth_poses, imu_samples, joint_samples, nominal_joint_sigma_rad,
+    recorded_images,
 };
 pub use text::{edit_distance, log_name, nearest_name, printable, printable_lines, shortened, without_signed_zeros};
 pub use topic_info::TopicInfo;

@@ -3,7 +3,7 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::estimator::{ColumnGroup, Linearization};
+use crate::estimator::{ColumnGroup, ColumnId, Linearization};
 use crate::geometry::dense;
 use crate::geometry::triangular_factor::TriangularFactor;
 use crate::gimbal::{Chain, ParameterId};
@@ -128,6 +128,36 @@ fn kept_columns(chain: &Chain, fixed_parameters: &[ParameterId]) -> Vec<usize> {
 pub(super) fn measured_information(linearization: &Linearization) -> Option<DMatrix<f64>> {
     let block = measured_block(linearization)?.block;
     Some(block.tr_mul(&block))
+}
+
+/// Rows of the measurements over some blocks of columns, in their order, and the calibration after them in units of 10°
+/// and 3 cm; all other unknowns are projected out. `None` when the linearization is not finite.
+pub(super) fn measured_rows(linearization: &Linearization, kept: &[ColumnId]) -> Option<DMatrix<f64>> {
+    let measurements = &linearization.jacobian;
+    if !measurements.iter().all(|entry| entry.is_finite()) {
+        return None;
+    }
+    let is_kept = |block: &Range<usize>| {
+        linearization.columns.iter().any(|column| column.start == block.start && kept.contains(&column.id))
+    };
+    let nuisance: Vec<usize> =
+        nuisance_blocks(linearization).into_iter().filter(|block| !is_kept(block)).flatten().collect();
+    let mut order = nuisance.clone();
+    for id in kept {
+        let block = linearization.columns.iter().find(|column| column.id == *id)?;
+        order.extend(block.start..block.start + block.len);
+    }
+    let scale = ScalingRule::Fixed.scale(&calibration_parameters(linearization));
+    order.extend(0..scale.len());
+    let norms: Vec<f64> = order.iter().map(|column| measurements.column(*column).norm()).collect();
+    let mut factor = TriangularFactor::new(order.len());
+    factor.merge_rows(measurements, &order);
+    let mut rows = project_out(&factor, nuisance.len(), &norms);
+    let calibration = rows.ncols() - scale.len();
+    for (column, scale) in scale.iter().enumerate() {
+        rows.column_mut(calibration + column).scale_mut(*scale);
+    }
+    Some(rows)
 }
 
 /// Calibration columns in units of 10° and 3 cm, by measurements alone, with all other unknowns projected out.

@@ -18,6 +18,15 @@ pub(super) fn project_out(factor: &TriangularFactor, nuisance: usize, norms: &[f
     upper.view((rank, nuisance), (upper.nrows() - rank, upper.ncols() - nuisance)).into_owned()
 }
 
+/// Rows with their first `count` columns projected out.
+pub(super) fn without_leading(rows: &DMatrix<f64>, count: usize) -> DMatrix<f64> {
+    let order: Vec<usize> = (0..rows.ncols()).collect();
+    let norms: Vec<f64> = rows.column_iter().map(|column| column.norm()).collect();
+    let mut factor = TriangularFactor::new(rows.ncols());
+    factor.merge_rows(rows, &order);
+    project_out(&factor, count, &norms)
+}
+
 /// Norms of the columns of two stacked Jacobians with the same columns.
 pub(super) fn column_norms(measurements: &DMatrix<f64>, priors: &DMatrix<f64>) -> Vec<f64> {
     (0..measurements.ncols())

@@ -19,9 +19,9 @@ mod outputs;
 mod pictures;
 mod plan;
 mod python;
+mod release;
 #[cfg(feature = "gui")]
 mod renderers;
-mod release;
 mod report;
 mod result_cache;
 mod results;

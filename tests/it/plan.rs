@@ -52,9 +52,9 @@ fn a_plan_has_the_same_bytes_on_any_number_of_threads_and_replaces_its_own() {
     let printed = plan(folder.path(), &[&[garden.as_str(), "-o", "b"], &SMALL[..]].concat(), "3", 0, &[]).stdout;
     let (a, b) = (files(&folder.path().join("a")), files(&folder.path().join("b")));
     let names: Vec<&str> = a.iter().map(|(name, _)| name.as_str()).collect();
-    assert_eq!(names, ["motion.csv", "plan.json", "plan.txt", "sigma.csv"]);
+    assert_eq!(names, ["listed.csv", "motion.csv", "plan.json", "plan.txt", "sigma.csv"]);
     assert!(a == b, "the files differ");
-    assert_eq!(printed, a[2].1, "the text is printed");
+    assert_eq!(printed, a[3].1, "the text is printed");
 
     let plan_json = index(&folder.path().join("a"));
     assert_eq!((plan_json["rig"].as_str(), plan_json["kind"].as_str()), (Some("garden"), Some("motion")));
@@ -62,16 +62,16 @@ fn a_plan_has_the_same_bytes_on_any_number_of_threads_and_replaces_its_own() {
     for limit in plan_json["limits"].as_array().expect("a list") {
         assert!(limit["reached"].as_f64() <= limit["limit"].as_f64().map(|limit| limit + 1e-9), "{limit}");
     }
-    let motion = String::from_utf8(a[0].1.clone()).expect("text");
+    let motion = String::from_utf8(a[1].1.clone()).expect("text");
     assert!(motion.starts_with("t_s,yaw_rad,roll_rad,pitch_rad,x_m,y_m,z_m,heading_rad\n0,"), "{motion}");
     assert_eq!(motion.lines().count(), 162);
-    let sigmas = String::from_utf8(a[3].1.clone()).expect("text");
+    let sigmas = String::from_utf8(a[4].1.clone()).expect("text");
     assert_eq!(sigmas.lines().count(), 1 + 9 * 18, "nine times, 18 parameters");
 
     let by_hand = [&[garden.as_str(), "-o", "a", "--by-hand"], &SMALL[..2]].concat();
     plan(folder.path(), &by_hand, "2", 0, &["plan.txt"]);
     let names: Vec<String> = files(&folder.path().join("a")).into_iter().map(|(name, _)| name).collect();
-    assert_eq!(names, ["plan.json", "plan.txt", "sigma.csv"], "moves by hand have no curves");
+    assert_eq!(names, ["motion.csv", "plan.json", "plan.txt", "sigma.csv"], "moves by hand are compared with nothing");
     let steps = index(&folder.path().join("a"))["steps"].as_array().map(Vec::len);
     assert_eq!(steps, Some(2));
     let other = [&[pan_tilt.as_str(), "-o", "a"], &SMALL[..]].concat();
@@ -89,6 +89,12 @@ fn mechanisms_with_two_and_with_five_joints_are_planned() {
         assert_eq!(plan["parameters"].as_array().map(Vec::len), Some(parameters), "{rig}");
         let motion = fs::read_to_string(folder.path().join(rig).join("motion.csv")).expect("a motion");
         assert_eq!(motion.lines().next().map(|line| line.split(',').count()), Some(joints + 5), "{rig}");
+        let motion = format!("{rig}/motion.csv");
+        let flight =
+            ["simulate", "T2", "-o", "t2.mcap", "--force", "--rig", path.as_str(), "--motion", motion.as_str()];
+        let output = dcvins(folder.path(), &[&flight[..], &["--duration", "0.5"]].concat(), "2");
+        assert!(output.status.success(), "{rig}: {}", String::from_utf8_lossy(&output.stderr));
+        assert!(String::from_utf8_lossy(&output.stdout).contains("10 images"), "{rig}");
     }
 }
 

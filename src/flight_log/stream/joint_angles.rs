@@ -25,6 +25,17 @@ const MIN_BATCH: usize = 3;
 /// Standard deviation of a joint's rate if a single reading does not constrain it.
 const UNKNOWN_RATE_RAD_PER_S: f64 = 1.0;
 
+/// Standard deviation of a joint angle at an image, in radians, from evenly spaced readings around it whose noise is white
+/// with this standard deviation.
+pub fn nominal_joint_sigma_rad(sigma_rad: f64, encoder_rate_hz: f64, image_rate_hz: f64) -> f64 {
+    let half_batch_s = (0.5 / image_rate_hz).min(seconds_from_ns(MAX_HALF_BATCH_NS));
+    let count = (2.0 * half_batch_s * encoder_rate_hz + 1e-9) as usize;
+    let reading = |index: usize| ((index as f64 - 0.5 * (count - 1) as f64) / encoder_rate_hz, 0.0);
+    let readings: Vec<Reading> = (0..count).map(reading).collect();
+    let averaged = angle_fit::fit(&readings, sigma_rad * sigma_rad).filter(|_| count >= MIN_BATCH);
+    averaged.map_or(sigma_rad, |fitted| fitted.variance_rad2.sqrt().min(sigma_rad))
+}
+
 /// Joint angles of a log at the stamps of images.
 pub(super) struct JointAngleStream {
     samples: JointSamples,

@@ -1,6 +1,6 @@
 //! Joint angles from batches of encoder readings, over many draws of their noise.
 
-use super::joint_angles::EncoderAverage;
+use super::joint_angles::{EncoderAverage, nominal_joint_sigma_rad};
 use crate::geometry::{SplitMix64, ns_from_seconds, seconds_from_ns};
 use crate::sensors::{JointAngles, JointSample};
 
@@ -68,6 +68,8 @@ fn white_noise_is_averaged_down_as_predicted() {
         let (error, stated) = errors(&played, swing);
         // Ten readings, and a little more for the curvature that they do not constrain.
         let (lower, upper) = (sigma / 10_f64.sqrt(), sigma * (9.0 / 40.0_f64).sqrt());
+        let nominal = nominal_joint_sigma_rad(sigma, 200.0, 20.0);
+        assert!((stated / nominal - 1.0).abs() < 0.12, "{sigma}: {stated} against {nominal}");
         assert!(stated > 0.99 * lower && stated < 1.15 * upper, "{sigma}: {stated} of {lower} to {upper}");
         // 2000 errors determine σ to 2 %; the prior on the curvature may overstate it a little.
         assert!(error < 1.06 * stated && error > 0.8 * stated, "{sigma}: {error} against {stated}");

@@ -22,9 +22,9 @@ use crate::simulation::{
 /// Duration of a candidate, in seconds.
 pub const ADVICE_DURATION_S: f64 = 4.0;
 /// Number of frames of a candidate's window: about as many keyframes as the estimator makes.
-pub(super) const FRAMES: usize = 16;
+const FRAMES: usize = 16;
 /// Landmarks drawn in each frame's view.
-pub(super) const LANDMARKS_PER_FRAME: usize = 12;
+const LANDMARKS_PER_FRAME: usize = 12;
 /// Rate of the simulated IMU samples: their covariance hardly depends on it.
 const IMU_RATE_HZ: f64 = 50.0;
 /// Largest amplitude of a joint.
@@ -177,20 +177,9 @@ pub(super) fn candidates(situation: &Situation) -> Vec<Exercise> {
 /// when it is not finite.
 fn information_of(situation: &Situation, exercise: &Exercise) -> Option<DMatrix<f64>> {
     let times_s: Vec<f64> = (0..FRAMES).map(|slot| ADVICE_DURATION_S * slot as f64 / (FRAMES - 1) as f64).collect();
-    let joints_at = |time_s: f64| joints_at(situation, exercise, time_s);
-    information_of_exercise(situation, exercise, &times_s, &joints_at)
-}
-
-/// Information matrix of the frames at these times of an exercise, with joint angles of their own.
-pub(super) fn information_of_exercise(
-    situation: &Situation,
-    exercise: &Exercise,
-    times_s: &[f64],
-    joints_at: &dyn Fn(f64) -> Vec<f64>,
-) -> Option<DMatrix<f64>> {
     let states: Vec<(f64, NavigationState, Vec<f64>)> = times_s
         .iter()
-        .map(|time_s| (*time_s, navigation_at(situation, exercise, *time_s), joints_at(*time_s)))
+        .map(|time_s| (*time_s, navigation_at(situation, exercise, *time_s), joints_at(situation, exercise, *time_s)))
         .collect();
     let gravity = situation.gravity_in_world;
     let frames: Vec<HypotheticalFrame> = states

@@ -31,9 +31,8 @@ pub use mechanism::{LaboratoryJoint, Mechanism, UnknownMechanism};
 pub use motion::{LaboratoryMotion, UnknownMotion};
 pub use planning::{
     HandPlan, HandStep, ListedComparison, MotionLimits, MotionPlan, MotionPlanError, MotionPrediction, MotionPredictor,
-    MotionProblem, MotionStart, PLAN_DURATION_S, PLAN_FRAME_PERIOD_S, PLAN_KNOT_S, PlanCriterion, PlanOptions,
-    PlanStart, PlanTable, PlannedParameter, ReachedLimit, SigmaRow, move_point, plan_by_hand, plan_motion,
-    scene_distances_m,
+    MotionProblem, MotionStart, PLAN_DURATION_S, PLAN_KNOT_S, PlanCriterion, PlanOptions, PlanStart, PlanTable,
+    PlannedParameter, ReachedLimit, SigmaRow, move_point, plan_by_hand, plan_motion, scene_distances_m,
 };
 pub use report::LaboratoryReport;
 pub use sensors::{

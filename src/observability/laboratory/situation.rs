@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::mechanism::LaboratoryJoint;
 use super::motion::middle_angle_rad;
-use super::{LaboratoryForm, LaboratorySetup};
+use super::{FRAME_PERIOD_S, LaboratoryForm, LaboratorySetup};
 use crate::camera::CameraModel;
 use crate::estimator::{EstimatorConfig, JointKnowledge, NavigationState, PoseKnowledge, StepReport, gravity_in_world};
 use crate::gimbal::{Chain, ParameterNames};
@@ -32,6 +32,8 @@ pub struct Situation {
     pub pixel_sigma_px: f64,
     /// Distances of the scene's landmarks from the camera, in metres.
     pub distances_m: Vec<f64>,
+    /// Time between two images, in seconds.
+    pub image_period_s: f64,
 }
 
 /// Information about a fixed parameter in units of 10° and 3 cm: σ is a millionth of the unit.
@@ -76,6 +78,7 @@ impl Situation {
             gravity_in_world: gravity_in_world(rig.gravity_m_per_s2),
             pixel_sigma_px: report.effective_pixel_sigma_px,
             distances_m,
+            image_period_s: rig.camera(camera_key).ok()?.rate_hz.recip(),
             chain,
         })
     }
@@ -105,6 +108,7 @@ impl Situation {
             gravity_in_world: window.gravity_in_world,
             pixel_sigma_px: window.pixel_sigma_px,
             distances_m: window.landmarks.iter().map(|landmark| landmark.inverse_distance_per_m.recip()).collect(),
+            image_period_s: FRAME_PERIOD_S,
             chain,
         })
     }
@@ -113,13 +117,14 @@ impl Situation {
     ///
     /// `joints` has one entry per joint of the configured chain. The joints start in the middle: at zero, moved so that
     /// at least a quarter of the range lies on both sides. `encoder_sigma_rad` is the standard deviation of an encoder
-    /// angle at a predicted frame. `None` when the calibration is fixed or a number is not finite.
+    /// angle at an image. `None` when the calibration is fixed or a number is not finite.
     pub fn before_flight(
         config: &EstimatorConfig,
         joints: Vec<LaboratoryJoint>,
         names: ParameterNames,
         encoder_sigma_rad: Option<f64>,
         distances_m: Vec<f64>,
+        image_period_s: f64,
     ) -> Option<Self> {
         let chain = Chain::from_classical(&config.chain, config.parameterization);
         // Without encoders the estimator fixes the joint offsets.
@@ -144,6 +149,7 @@ impl Situation {
             gravity_in_world: gravity_in_world(config.gravity_m_per_s2),
             pixel_sigma_px: config.options.pixel_sigma_px,
             distances_m,
+            image_period_s,
             chain,
         })
     }

@@ -1,16 +1,10 @@
 //! Situation before a flight that is to be planned: a rig, and the run that will estimate its calibration.
 
 use super::configuration::estimator_config;
-use crate::observability::laboratory::{LaboratoryJoint, PLAN_FRAME_PERIOD_S, Situation};
+use crate::flight_log::nominal_joint_sigma_rad;
+use crate::observability::laboratory::{LaboratoryJoint, Situation};
 use crate::sensors::{CameraMount, Rig};
 use crate::session::plan::{RunSpec, SessionError, cameras_of_run};
-
-/// Largest time around an image from which encoder readings are averaged, in seconds.
-const MAX_BATCH_S: f64 = 0.05;
-/// Smallest number of readings that are averaged.
-const MIN_BATCH: f64 = 3.0;
-/// Variance of the middle of a parabola fitted to evenly spaced readings, times their number.
-const PARABOLA_VARIANCE: f64 = 2.25;
 
 /// Situation before a flight, with the noise, the prior and the parameterization of a run and a scene at these
 /// distances.
@@ -31,21 +25,12 @@ pub fn situation_before_flight(rig: &Rig, spec: &RunSpec, distances_m: Vec<f64>)
     let gimbal = rig.gimbal.as_ref().filter(|_| camera.mount == CameraMount::Gimbal);
     let joints = gimbal.map_or(&[][..], |gimbal| gimbal.joints.as_slice()).iter();
     let joints = joints.map(|joint| LaboratoryJoint { name: joint.name.clone(), limits_rad: joint.limits_rad });
-    let encoder_sigma_rad = config.encoder_in_use().map(|sigma_rad| {
-        let at_image = averaged_sigma_rad(sigma_rad, gimbal.map_or(0.0, |gimbal| gimbal.rate_hz), camera.rate_hz);
-        // The readings at images that do not become keyframes are carried to the next one.
-        at_image / (PLAN_FRAME_PERIOD_S * camera.rate_hz).max(1.0).sqrt()
-    });
-    Situation::before_flight(&config, joints.collect(), rig.parameter_names(), encoder_sigma_rad, distances_m)
+    let encoder_rate_hz = gimbal.map_or(0.0, |gimbal| gimbal.rate_hz);
+    let at_image = |sigma_rad| nominal_joint_sigma_rad(sigma_rad, encoder_rate_hz, camera.rate_hz);
+    let encoder_sigma_rad = config.encoder_in_use().map(at_image);
+    let (names, period_s) = (rig.parameter_names(), camera.rate_hz.recip());
+    Situation::before_flight(&config, joints.collect(), names, encoder_sigma_rad, distances_m, period_s)
         .ok_or_else(|| unplannable("the mechanism or its prior is not finite"))
-}
-
-/// Standard deviation of a joint angle at an image, from the readings around it as the reader of logs averages them if
-/// their noise is white.
-fn averaged_sigma_rad(sigma_rad: f64, encoder_rate_hz: f64, camera_rate_hz: f64) -> f64 {
-    let batch_s = camera_rate_hz.recip().min(MAX_BATCH_S);
-    let readings = (encoder_rate_hz * batch_s).floor();
-    if readings >= MIN_BATCH { sigma_rad * (PARABOLA_VARIANCE / readings).sqrt().min(1.0) } else { sigma_rad }
 }
 
 #[cfg(test)]
@@ -61,9 +46,10 @@ mod tests {
         let minimal = of("minimal:pixel-noise=2").unwrap();
         assert_eq!(minimal.chain.parameters().len(), 18);
         assert!((minimal.pixel_sigma_px - 0.5).abs() < 1e-12);
-        // Ten readings per image interval of 50 ms, five images per predicted frame.
+        // Ten readings per image interval of 50 ms: between those of a line and of a parabola.
         let JointKnowledge::Encoder(sigma_rad) = minimal.encoders else { panic!("the rig has encoders") };
-        assert!((sigma_rad / 0.5_f64.to_radians() - 0.045_f64.sqrt()).abs() < 1e-9, "{sigma_rad}");
+        let ratio = sigma_rad / 0.5_f64.to_radians();
+        assert!(ratio > 0.1_f64.sqrt() && ratio < 0.5 * (0.1_f64.sqrt() + 0.225_f64.sqrt()), "{ratio}");
         let (translation_m, rotation_rad) = rig.gimbal.as_ref().unwrap().prior.sigmas();
         let covariance = minimal.information.clone().cholesky().unwrap().inverse();
         for (column, parameter) in minimal.chain.parameters().into_iter().enumerate() {

@@ -6,14 +6,15 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::super::Situation;
 use super::moves::{HandMove, combined};
-use super::objective::Objective;
+use super::search::SearchProblem;
+use super::starts;
 use super::summary::{PlanTable, SigmaRow};
-use super::windows::WindowLayout;
+use super::windows::{joined, rows_of_interval, trajectory};
+use crate::simulation::MotionSplines;
 
 /// Moves for a person, with the predicted σ after each.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Serialize)]
 pub struct HandPlan {
     pub steps: Vec<HandStep>,
     /// Parameters at the end.
@@ -22,6 +23,8 @@ pub struct HandPlan {
     /// σ at the start and after each step.
     #[serde(skip)]
     pub sigmas: Vec<SigmaRow>,
+    #[serde(skip)]
+    pub motion: MotionSplines,
 }
 
 /// One move, which starts and ends with the joints at their middle angles.
@@ -37,54 +40,57 @@ pub struct HandStep {
     pub worst_ratio: f64,
 }
 
-/// A step with the information of all steps so far.
-#[derive(Clone, Debug)]
-pub(super) struct ChosenMove {
-    pub(super) choice: HandMove,
-    pub(super) information: DMatrix<f64>,
-}
-
-/// Chooses the move of each window that lowers the criterion most after those before; every move starts from rest.
-pub(super) fn choose(situation: &Situation, objective: &Objective, layout: &WindowLayout) -> Vec<ChosenMove> {
-    let times_s = layout.times_s(0);
-    let moves: Vec<(HandMove, DMatrix<f64>)> = combined(situation)
-        .par_iter()
-        .filter_map(|choice| Some((*choice, choice.information(situation, &times_s)?)))
-        .collect();
+/// Chooses the move of each window that lowers the criterion most after those before; every move starts from rest, and
+/// without the measurements of the motion before it.
+pub(super) fn choose(problem: &SearchProblem<'_>, duration_s: f64) -> Vec<HandMove> {
+    let &SearchProblem { situation, objective, ref layout, .. } = problem;
     let columns = situation.information.ncols();
-    let mut chosen: Vec<ChosenMove> = Vec::new();
+    let of = |choice: HandMove| {
+        // The second window of the continued move: it grows to its size in the first one.
+        let motion = starts::as_described(problem, duration_s, &[choice]);
+        let interval_s = layout.interval_s(usize::from(layout.count > 1));
+        let rows = rows_of_interval(situation, &motion, &trajectory(situation, &motion), layout, interval_s)?;
+        Some((choice, joined([&rows], columns)))
+    };
+    let moves: Vec<(HandMove, DMatrix<f64>)> = combined(situation).into_par_iter().filter_map(of).collect();
+    let mut chosen = Vec::new();
+    let mut before = DMatrix::zeros(columns, columns);
     for _ in 0..layout.count {
-        let before = chosen.last().map_or_else(|| DMatrix::zeros(columns, columns), |last| last.information.clone());
         let value = |gained: &DMatrix<f64>| objective.search_value(&(&before + gained)).unwrap_or(f64::INFINITY);
         let values: Vec<f64> = moves.iter().map(|(_, gained)| value(gained)).collect();
         // The first of equal moves.
         let best = (0..moves.len()).min_by(|a, b| values[*a].total_cmp(&values[*b]));
         let Some(best) = best.filter(|best| values[*best].is_finite()) else { break };
-        chosen.push(ChosenMove { choice: moves[best].0, information: before + &moves[best].1 });
+        chosen.push(moves[best].0);
+        before += &moves[best].1;
     }
     chosen
 }
 
 impl HandPlan {
-    pub(super) fn new(situation: &Situation, objective: &Objective, layout: &WindowLayout) -> Option<Self> {
-        let chosen = choose(situation, objective, layout);
+    pub(super) fn new(problem: &SearchProblem<'_>, duration_s: f64) -> Option<Self> {
+        let &SearchProblem { situation, objective, ref layout, .. } = problem;
+        let moves = choose(problem, duration_s);
+        let flown = problem.evaluate(starts::as_described(problem, duration_s, &moves))?;
         let mut steps = Vec::new();
         let columns = situation.information.ncols();
         let start = PlanTable::new(situation, objective, &DMatrix::zeros(columns, columns))?;
         let mut sigmas = vec![SigmaRow::new(0.0, &start)];
-        for (index, step) in chosen.iter().enumerate() {
-            let table = PlanTable::new(situation, objective, &step.information)?;
+        let mut last = None;
+        for (index, step) in moves.iter().enumerate() {
+            let gained = problem.total(&flown.windows[..=index]);
+            let table = PlanTable::new(situation, objective, &gained)?;
             steps.push(HandStep {
-                words: step.choice.words(situation),
+                words: step.words(situation),
                 duration_s: layout.length_s,
-                value: objective.value(&step.information)?,
+                value: objective.value(&gained)?,
                 worst: table.worst.clone(),
                 worst_ratio: table.worst_ratio,
             });
             sigmas.push(SigmaRow::new((index + 1) as f64 * layout.length_s, &table));
+            last = Some(table);
         }
-        let table = PlanTable::new(situation, objective, &chosen.last()?.information)?;
-        Some(Self { steps, table, sigmas })
+        Some(Self { steps, table: last?, sigmas, motion: flown.motion })
     }
 }
 

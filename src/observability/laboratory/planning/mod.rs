@@ -1,16 +1,18 @@
 //! Planned motions: curves of joints and vehicle that leave the calibration with the smallest predicted σ.
 //!
 //! A motion is one spline per joint and per axis of the vehicle ([`MotionSplines`](crate::simulation::MotionSplines)).
-//! Its information is that of consecutive windows, each linearized as a candidate of the suggested excitation is
-//! ([`super::advise`]). The search adds bumps to the splines within the limits of joints and vehicle.
+//! Its information is that of consecutive windows with the keyframes that the estimator makes of it, each linearized by
+//! the factors of the estimator. The search adds bumps to the splines within the limits of joints and vehicle.
 
 mod by_hand;
 mod edit;
+mod keyframes;
 mod limits;
 mod moves;
 mod objective;
 mod plan;
 mod problem;
+mod repeated;
 mod search;
 mod starts;
 mod summary;
@@ -28,4 +30,4 @@ pub use plan::{
 pub use problem::{MotionPrediction, MotionPredictor, MotionProblem, MotionStart};
 pub use starts::PLAN_KNOT_S;
 pub use summary::{PlanTable, PlannedParameter, SigmaRow};
-pub use windows::{PLAN_FRAME_PERIOD_S, scene_distances_m};
+pub use windows::scene_distances_m;

@@ -1,11 +1,7 @@
 //! Moves with words: those of the suggested excitation, and the same with a second joint.
 
-use nalgebra::DMatrix;
-use rayon::prelude::*;
-
 use super::super::Situation;
-use super::super::advice::{candidates, information_of_exercise, words};
-use super::windows::{WindowLayout, sum};
+use super::super::advice::{candidates, words};
 use crate::simulation::{Exercise, JointSwing};
 
 /// Time of the second joint relative to the first: its swings are slower, so that the two are not correlated.
@@ -33,15 +29,6 @@ impl HandMove {
         let name = situation.joints.get(second.joint).map_or("a joint", |joint| joint.name.as_str());
         format!("{one}, and more slowly {name} ±{:.0}°", second.amplitude_rad.to_degrees())
     }
-
-    /// Information of the frames at these times of the move.
-    pub(super) fn information(&self, situation: &Situation, times_s: &[f64]) -> Option<DMatrix<f64>> {
-        let joints_at = |time_s: f64| {
-            let angles = situation.joints_rad.iter().enumerate();
-            angles.map(|(joint, angle_rad)| angle_rad + self.joint_rad(joint, time_s)).collect()
-        };
-        information_of_exercise(situation, &self.exercise, times_s, &joints_at)
-    }
 }
 
 /// The listed motions: each swing of the vehicle with none or one of the joints.
@@ -60,22 +47,4 @@ pub(super) fn combined(situation: &Situation) -> Vec<HandMove> {
         moves.extend(seconds.map(|second| HandMove { second: Some(second), ..*first }));
     }
     moves
-}
-
-/// A listed motion, continued over a whole flight.
-#[derive(Clone, Debug)]
-pub(super) struct RepeatedMove {
-    pub(super) choice: HandMove,
-    /// Sum over the windows.
-    pub(super) information: DMatrix<f64>,
-}
-
-/// Information of each listed motion, continued over all windows of a flight.
-pub(super) fn repeated(situation: &Situation, layout: &WindowLayout) -> Vec<RepeatedMove> {
-    let of = |choice: &HandMove| {
-        let window = |window: usize| choice.information(situation, &layout.times_s(window));
-        let windows: Vec<DMatrix<f64>> = (0..layout.count).map(window).collect::<Option<_>>()?;
-        Some(RepeatedMove { choice: *choice, information: sum(&windows, situation.information.ncols()) })
-    };
-    listed(situation).par_iter().filter_map(of).collect()
 }

@@ -11,12 +11,12 @@ use thiserror::Error;
 use super::super::Situation;
 use super::by_hand::{HandPlan, choose};
 use super::limits::{MotionLimits, ReachedLimit};
-use super::moves::{RepeatedMove, repeated};
 use super::objective::{Objective, PlanCriterion};
+use super::repeated::RepeatedMove;
 use super::search::{SearchProblem, SearchedMotion};
 use super::starts;
 use super::summary::{PlanTable, SigmaRow};
-use super::windows::{WindowLayout, information_of_frames, sum, trajectory};
+use super::windows::{WindowLayout, joined, rows_of_interval, trajectory};
 use crate::geometry::SplitMix64;
 use crate::gimbal::ParameterId;
 use crate::simulation::MotionSplines;
@@ -69,13 +69,15 @@ pub struct PlanStart {
 }
 
 /// Best of the listed motions, repeated over the same time.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Serialize)]
 pub struct ListedComparison {
     pub words: String,
     pub value: f64,
     pub worst: String,
     pub worst_ratio: f64,
     pub mean_ratio: f64,
+    #[serde(skip)]
+    pub motion: MotionSplines,
 }
 
 /// A planned motion with its predicted σ.
@@ -102,7 +104,8 @@ pub struct MotionPlan {
 /// If the duration is out of range, or nothing is observable.
 pub fn plan_by_hand(situation: &Situation, options: &PlanOptions) -> Result<HandPlan, MotionPlanError> {
     let (objective, layout) = problem(situation, options)?;
-    HandPlan::new(situation, &objective, &layout).ok_or(MotionPlanError::NotFinite)
+    let problem = SearchProblem { situation, objective: &objective, limits: &options.limits, layout };
+    HandPlan::new(&problem, options.duration_s).ok_or(MotionPlanError::NotFinite)
 }
 
 /// Searches the motion with the smallest criterion within the limits.
@@ -125,7 +128,7 @@ pub fn plan_motion(
         layout: WindowLayout::coarse(options.duration_s),
     };
     let fine = SearchProblem { layout, ..coarse };
-    let repeated = repeated(situation, &layout);
+    let repeated = RepeatedMove::all(&fine, options.duration_s);
     let begun = begin(&coarse, options, &repeated);
     let finalists = FINALISTS.min(begun.len());
     // A trial with fine windows takes about four times as long.
@@ -186,18 +189,16 @@ fn problem(situation: &Situation, options: &PlanOptions) -> Result<(Objective, W
 
 /// Motions from which the search starts, each with its origin.
 fn begin(coarse: &SearchProblem<'_>, options: &PlanOptions, repeated: &[RepeatedMove]) -> Vec<(String, MotionSplines)> {
-    let (situation, layout) = (coarse.situation, &coarse.layout);
+    let situation = coarse.situation;
     let best = best_of(coarse.objective, repeated);
     let motion = |index: usize| match (index, best) {
         (0, _) => {
-            let moves: Vec<_> =
-                choose(situation, coarse.objective, layout).into_iter().map(|chosen| chosen.choice).collect();
-            let motion = starts::of_moves(situation, &options.limits, options.duration_s, &moves, layout.length_s);
+            let moves = choose(coarse, options.duration_s);
+            let motion = starts::of_moves(coarse, options.duration_s, &moves);
             ("best moves in turn".to_owned(), motion)
         }
         (1, Some(best)) => {
-            let moves = [best.choice];
-            let motion = starts::of_moves(situation, &options.limits, options.duration_s, &moves, layout.length_s);
+            let motion = starts::of_moves(coarse, options.duration_s, &[best.choice]);
             ("best listed motion, repeated".to_owned(), motion)
         }
         _ => {
@@ -237,6 +238,7 @@ fn finished(
             worst: table.worst,
             worst_ratio: table.worst_ratio,
             mean_ratio: table.mean_ratio,
+            motion: best.motion.clone(),
         })
     });
     Some(Ok(MotionPlan {
@@ -253,7 +255,7 @@ fn finished(
 
 /// Predicted σ at the start, at each second and at the end.
 fn sigmas_over_time(fine: &SearchProblem<'_>, best: &SearchedMotion) -> Option<Vec<SigmaRow>> {
-    let (situation, layout) = (fine.situation, &fine.layout);
+    let (situation, layout) = (fine.situation, fine.layout);
     let flight = trajectory(situation, &best.motion);
     let rows = (best.motion.duration_s() / ROW_S).floor() as usize;
     let mut times_s: Vec<f64> = (0..=rows).map(|row| row as f64 * ROW_S).collect();
@@ -262,15 +264,14 @@ fn sigmas_over_time(fine: &SearchProblem<'_>, best: &SearchedMotion) -> Option<V
     }
     let row = |time_s: &f64| {
         let window = ((time_s / layout.length_s + 1e-9) as usize).min(layout.count);
-        let mut gained = sum(&best.windows[..window], situation.information.ncols());
+        let mut begun = None;
         if window < layout.count {
-            let mut frames_s = layout.times_s(window);
-            frames_s.retain(|frame_s| frame_s < time_s);
-            // Fewer than three frames do not triangulate.
-            if frames_s.len() >= 3 {
-                gained += information_of_frames(situation, &best.motion, &flight, &frames_s, layout.landmarks)?;
+            let [from_s, _] = layout.interval_s(window);
+            if *time_s > from_s + 1e-9 {
+                begun = Some(rows_of_interval(situation, &best.motion, &flight, &layout, [from_s, *time_s])?);
             }
         }
+        let gained = joined(best.windows[..window].iter().chain(&begun), situation.information.ncols());
         Some(SigmaRow::new(*time_s, &PlanTable::new(situation, fine.objective, &gained)?))
     };
     times_s.par_iter().map(row).collect()

@@ -15,7 +15,7 @@ use super::plan::{MotionPlanError, PLAN_DURATION_S};
 use super::search::SearchProblem;
 use super::starts;
 use super::summary::PlanTable;
-use super::windows::{WindowLayout, information_of_window, sum, trajectory};
+use super::windows::{WindowLayout, WindowRows, joined, rows_of_interval, trajectory};
 use crate::geometry::SplitMix64;
 use crate::simulation::MotionSplines;
 use crate::text::Named;
@@ -108,12 +108,11 @@ impl MotionProblem {
     pub fn start(&self, start: MotionStart, limits: &MotionLimits, duration_s: f64) -> MotionSplines {
         let situation = &*self.situation;
         let motion = match start {
-            MotionStart::AtRest => starts::at_rest(situation, duration_s),
+            MotionStart::AtRest => starts::at_rest(situation, duration_s, starts::PLAN_KNOT_S),
             MotionStart::Waves => starts::random(situation, limits, duration_s, &mut SplitMix64::new(SEED)),
             MotionStart::Moves => {
-                let chosen = choose(situation, self.objective(), &self.layout);
-                let moves: Vec<_> = chosen.into_iter().map(|chosen| chosen.choice).collect();
-                starts::of_moves(situation, limits, duration_s, &moves, self.layout.length_s)
+                let coarse = SearchProblem { layout: WindowLayout::coarse(duration_s), ..self.search(limits) };
+                starts::of_moves(&coarse, duration_s, &choose(&coarse, duration_s))
             }
         };
         self.search(limits).within_limits(motion)
@@ -164,10 +163,10 @@ impl MotionProblem {
         SearchProblem { situation: &self.situation, objective: self.objective(), limits, layout: self.layout }
     }
 
-    /// σ with the information of the windows of a motion.
-    fn prediction(&self, windows: &[DMatrix<f64>]) -> Option<MotionPrediction> {
+    /// σ with the rows of the windows of a motion.
+    fn prediction(&self, windows: &[WindowRows]) -> Option<MotionPrediction> {
         let columns = self.situation.information.ncols();
-        let (gained, nothing) = (sum(windows, columns), DMatrix::zeros(columns, columns));
+        let (gained, nothing) = (joined(windows, columns), DMatrix::zeros(columns, columns));
         let table = |objective: &Objective, gained: &DMatrix<f64>| PlanTable::new(&self.situation, objective, gained);
         let after = |gained: &DMatrix<f64>| self.after_flight.as_ref().map(|objective| table(objective, gained));
         Some(MotionPrediction {
@@ -189,7 +188,7 @@ pub struct MotionPredictor {
 struct PredictedWindows {
     situation: Arc<Situation>,
     motion: MotionSplines,
-    information: Vec<DMatrix<f64>>,
+    windows: Vec<WindowRows>,
 }
 
 impl MotionPredictor {
@@ -200,13 +199,13 @@ impl MotionPredictor {
         let changed = known.as_ref().map_or_else(|| vec![true; layout.count], |known| known.changed(motion, layout));
         let flight = trajectory(situation, motion);
         let of = |window: usize| match &known {
-            Some(known) if !changed[window] => Some(known.information[window].clone()),
-            _ => information_of_window(situation, motion, &flight, layout, window),
+            Some(known) if !changed[window] => Some(known.windows[window].clone()),
+            _ => rows_of_interval(situation, motion, &flight, layout, layout.interval_s(window)),
         };
-        let information: Vec<DMatrix<f64>> = (0..layout.count).into_par_iter().map(of).collect::<Option<_>>()?;
-        let prediction = problem.prediction(&information);
+        let windows: Vec<WindowRows> = (0..layout.count).into_par_iter().map(of).collect::<Option<_>>()?;
+        let prediction = problem.prediction(&windows);
         self.last =
-            Some(PredictedWindows { situation: Arc::clone(&problem.situation), motion: motion.clone(), information });
+            Some(PredictedWindows { situation: Arc::clone(&problem.situation), motion: motion.clone(), windows });
         prediction
     }
 }
@@ -217,7 +216,7 @@ impl PredictedWindows {
         let same_knots = self.motion.point_count() == motion.point_count()
             && self.motion.channel_count() == motion.channel_count()
             && self.motion.duration_s() == motion.duration_s();
-        if !same_knots || self.information.len() != layout.count {
+        if !same_knots || self.windows.len() != layout.count {
             return vec![true; layout.count];
         }
         let mut changed = vec![false; layout.count];

@@ -8,7 +8,7 @@ use nalgebra::DMatrix;
 use super::super::Situation;
 use super::limits::MotionLimits;
 use super::objective::Objective;
-use super::windows::{WindowLayout, information_of_window, sum, trajectory};
+use super::windows::{WindowLayout, WindowRows, joined, rows_of_interval, trajectory};
 use crate::geometry::SplitMix64;
 use crate::simulation::MotionSplines;
 
@@ -38,11 +38,11 @@ pub(super) struct SearchProblem<'a> {
     pub(super) layout: WindowLayout,
 }
 
-/// A motion with the information of its windows.
+/// A motion with the rows of its windows.
 #[derive(Clone, Debug)]
 pub(super) struct SearchedMotion {
     pub(super) motion: MotionSplines,
-    pub(super) windows: Vec<DMatrix<f64>>,
+    pub(super) windows: Vec<WindowRows>,
     /// Value that the search minimizes.
     pub(super) value: f64,
 }
@@ -65,17 +65,19 @@ impl Bump {
 }
 
 impl SearchProblem<'_> {
-    /// Information of every window of a motion; `None` when a number is not finite.
+    /// Rows of every window of a motion; `None` when a number is not finite.
     pub(super) fn evaluate(&self, motion: MotionSplines) -> Option<SearchedMotion> {
         let flight = trajectory(self.situation, &motion);
-        let of = |window| information_of_window(self.situation, &motion, &flight, &self.layout, window);
-        let windows: Vec<DMatrix<f64>> = (0..self.layout.count).map(of).collect::<Option<_>>()?;
+        let of =
+            |window| rows_of_interval(self.situation, &motion, &flight, &self.layout, self.layout.interval_s(window));
+        let windows: Vec<WindowRows> = (0..self.layout.count).map(of).collect::<Option<_>>()?;
         let value = self.objective.search_value(&self.total(&windows))?;
         Some(SearchedMotion { motion, windows, value })
     }
 
-    pub(super) fn total(&self, windows: &[DMatrix<f64>]) -> DMatrix<f64> {
-        sum(windows, self.situation.information.ncols())
+    /// Information of consecutive windows.
+    pub(super) fn total(&self, windows: &[WindowRows]) -> DMatrix<f64> {
+        joined(windows, self.situation.information.ncols())
     }
 
     /// Runs a number of trials from a motion; `stop` is asked after each, with the best motion so far.
@@ -139,7 +141,8 @@ impl SearchProblem<'_> {
             is_changed[self.layout.within(reach_s(&motion, bump))].fill(true);
         }
         for (window, _) in is_changed.iter().enumerate().filter(|(_, is_changed)| **is_changed) {
-            windows[window] = information_of_window(self.situation, &motion, &flight, &self.layout, window)?;
+            windows[window] =
+                rows_of_interval(self.situation, &motion, &flight, &self.layout, self.layout.interval_s(window))?;
         }
         let value = self.objective.search_value(&self.total(&windows))?;
         Some(SearchedMotion { motion, windows, value })

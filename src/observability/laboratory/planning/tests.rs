@@ -3,8 +3,9 @@ use std::ops::ControlFlow;
 use nalgebra::DMatrix;
 
 use super::super::{LaboratoryJoint, Mechanism, Situation};
+use super::keyframes::keyframe_times_s;
 use super::objective::Objective;
-use super::windows::{WindowLayout, information_of_frames, information_of_window, sum, trajectory};
+use super::windows::{WindowLayout, WindowRows, joined, rows_of_interval, rows_of_keyframes, trajectory};
 use super::{
     MotionLimits, MotionPlan, MotionPlanError, MotionPredictor, MotionProblem, MotionStart, PlanCriterion, PlanOptions,
     move_point, plan_by_hand, plan_motion, starts,
@@ -32,7 +33,7 @@ fn situation_in(form: Parameterization, mechanism: &str, encoder_sigma_rad: Opti
     };
     let joints: Vec<LaboratoryJoint> =
         mechanism.joints.into_iter().map(|joint| LaboratoryJoint { limits_rad: (-0.8, 0.8), ..joint }).collect();
-    Situation::before_flight(&config, joints, mechanism.names, encoder_sigma_rad, vec![4.0, 6.0, 9.0]).unwrap()
+    Situation::before_flight(&config, joints, mechanism.names, encoder_sigma_rad, vec![4.0, 6.0, 9.0], 0.05).unwrap()
 }
 
 fn options(situation: &Situation, trials: usize) -> PlanOptions {
@@ -140,26 +141,32 @@ fn moves_by_hand_lower_sigma_step_by_step() {
 }
 
 #[test]
-fn the_information_of_consecutive_windows_adds_up() {
+fn joined_windows_equal_one_long_window_but_for_the_landmarks_between_them() {
     let situation = situation("yaw-roll-pitch-offset", Some(0.5_f64.to_radians()));
     let limits = MotionLimits::slow(situation.joints.iter().map(|joint| joint.limits_rad).collect());
     let motion = starts::random(&situation, &limits, 8.0, &mut SplitMix64::new(1));
     let flight = trajectory(&situation, &motion);
     let layout = WindowLayout::fine(8.0);
-    let windows: Vec<DMatrix<f64>> = (0..layout.count)
-        .map(|window| information_of_window(&situation, &motion, &flight, &layout, window).unwrap())
-        .collect();
-    let added = sum(&windows, situation.information.ncols());
-    let times_s: Vec<f64> = (0..layout.count).flat_map(|window| layout.times_s(window)).collect();
-    let long = information_of_frames(&situation, &motion, &flight, &times_s, layout.landmarks).unwrap();
+    let columns = situation.information.ncols();
+    let rows = |interval_s: [f64; 2]| rows_of_interval(&situation, &motion, &flight, &layout, interval_s).unwrap();
+    let windows: Vec<WindowRows> = (0..layout.count).map(|window| rows(layout.interval_s(window))).collect();
+    let keyframes = |window| keyframe_times_s(&situation, &motion, &flight, layout.interval_s(window));
+    let times_s = [keyframes(0), keyframes(1)].concat();
+    assert!((8..=64).contains(&times_s.len()), "{times_s:?}");
     let objective = Objective::new(&situation, PlanCriterion::Worst, &[]).unwrap();
-    let (_, added) = objective.sigmas(&added).unwrap();
-    let (_, long) = objective.sigmas(&long).unwrap();
-    // One long window knows more: velocity and biases at the middle, landmarks on both sides of it.
-    let excess: Vec<f64> = added.iter().zip(&long).map(|(added, long)| added / long - 1.0).collect();
-    assert!(excess.iter().all(|excess| (0.0..0.5).contains(excess)), "{excess:.3?}");
-    let mean = excess.iter().sum::<f64>() / excess.len() as f64;
-    assert!(mean < 0.25, "{excess:.3?}");
+    let sigmas = |information: &DMatrix<f64>| objective.sigmas(information).unwrap().1;
+    let excess = |some: &[f64], all: &[f64]| -> Vec<f64> { some.iter().zip(all).map(|(a, b)| a / b - 1.0).collect() };
+    let long = rows_of_keyframes(&situation, &motion, &flight, (&times_s, 8.0), layout.features).unwrap();
+    let long = sigmas(&joined([&long], columns));
+    let of_joined = excess(&sigmas(&joined(&windows, columns)), &long);
+    assert!(of_joined.iter().all(|excess| (-0.1..0.4).contains(excess)), "{of_joined:.3?}");
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    // Without what the first window has measured of velocity and biases, the second one constrains less.
+    let apart = joined([&windows[0]], columns) + joined([&windows[1]], columns);
+    let of_apart = excess(&sigmas(&apart), &long);
+    assert!(mean(&of_joined) < 0.12, "{of_joined:.3?}");
+    assert!(mean(&of_joined) < 0.7 * mean(&of_apart), "{of_joined:.3?} {of_apart:.3?}");
+    assert!(of_joined.iter().zip(&of_apart).all(|(joined, apart)| joined < apart), "{of_joined:.3?} {of_apart:.3?}");
 }
 
 /// Problem of 8 s with its limits, and waves.
@@ -228,10 +235,9 @@ fn information_of_a_flight_adds_to_that_of_a_motion() {
     let gained = |motion: &MotionSplines| {
         let layout = WindowLayout::fine(8.0);
         let flight = trajectory(&situation, motion);
-        let windows: Vec<DMatrix<f64>> = (0..layout.count)
-            .map(|window| information_of_window(&situation, motion, &flight, &layout, window).unwrap())
-            .collect();
-        sum(&windows, situation.information.ncols())
+        let rows = |window| rows_of_interval(&situation, motion, &flight, &layout, layout.interval_s(window)).unwrap();
+        let windows: Vec<WindowRows> = (0..layout.count).map(rows).collect();
+        joined(&windows, situation.information.ncols())
     };
     let information = &situation.information + gained(&motion);
     let flown = Situation { information, ..situation.clone() };

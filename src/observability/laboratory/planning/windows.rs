@@ -1,26 +1,30 @@
 //! Information of a planned motion, window by window.
 //!
-//! The calibration is constant, so that the information of consecutive windows adds up. Each window is independent of
-//! the others: what it measured of pose, velocity and biases is not used by the next one.
+//! The calibration is constant, so that the information of consecutive windows adds up. Each window starts with what
+//! those before it have measured of pose, velocity and biases; no landmark is observed in two of them.
 
 use std::ops::Range;
 
 use nalgebra::DMatrix;
 
 use super::super::Situation;
-use super::super::advice::{ADVICE_DURATION_S, FRAMES, LANDMARKS_PER_FRAME};
-use super::super::predicted_window::predicted_information;
-use crate::estimator::{HypotheticalFrame, NavigationState};
+use super::super::advice::ADVICE_DURATION_S;
+use super::super::predicted_window::predicted_linearization;
+use super::keyframes::keyframe_times_s;
+use crate::estimator::{ColumnId, FrameId, HypotheticalFrame, JointKnowledge, NavigationState};
 use crate::geometry::{RigidTransform, ns_from_seconds};
+use crate::observability::analysis::measured_rows;
+use crate::observability::elimination::without_leading;
 use crate::sensors::ImuSample;
 use crate::simulation::{MotionSplines, Trajectory};
 use nalgebra::Vector3;
 
 /// Rate of the predicted IMU samples, which hardly affects their covariance.
 const IMU_RATE_HZ: f64 = 50.0;
-
-/// Time between the frames of a planned motion, in seconds.
-pub const PLAN_FRAME_PERIOD_S: f64 = ADVICE_DURATION_S / FRAMES as f64;
+/// Features that the front end keeps in an image.
+const FEATURES: usize = 150;
+/// Largest number of keyframes in a window: with more, evenly chosen ones stand for all.
+const MAX_KEYFRAMES: usize = 32;
 
 /// Distances of an assumed scene from its nearest to its farthest point, in equal ratios.
 pub fn scene_distances_m([near_m, far_m]: [f64; 2]) -> Vec<f64> {
@@ -35,28 +39,38 @@ pub(super) struct WindowLayout {
     pub(super) count: usize,
     /// Length of each window, in seconds.
     pub(super) length_s: f64,
-    /// Number of frames in each window.
-    pub(super) frames: usize,
-    /// Landmarks drawn in the view of each frame.
-    pub(super) landmarks: usize,
+    /// Features in each image.
+    pub(super) features: usize,
+    /// Keyframes for each one that is used.
+    pub(super) thinning: usize,
 }
 
 impl WindowLayout {
-    /// Windows of about 4 s, with as many frames and landmarks as the candidates of the suggested excitation.
+    /// Windows of about 4 s with all keyframes.
     pub(super) fn fine(duration_s: f64) -> Self {
         let count = (duration_s / ADVICE_DURATION_S).round().max(1.0) as usize;
-        Self { count, length_s: duration_s / count as f64, frames: FRAMES, landmarks: LANDMARKS_PER_FRAME }
+        Self { count, length_s: duration_s / count as f64, features: FEATURES, thinning: 1 }
     }
 
-    /// The same windows with half of the frames and half of the landmarks of each, for the first part of a search.
+    /// The same windows with half of the keyframes and half of the features, for the first part of a search.
     pub(super) fn coarse(duration_s: f64) -> Self {
-        Self { frames: FRAMES / 2, landmarks: LANDMARKS_PER_FRAME / 2, ..Self::fine(duration_s) }
+        Self { features: FEATURES / 2, thinning: 2, ..Self::fine(duration_s) }
     }
 
-    /// Times of the frames of a window; a window ends one interval before the next one starts.
-    pub(super) fn times_s(&self, window: usize) -> Vec<f64> {
-        let period_s = self.length_s / self.frames as f64;
-        (0..self.frames).map(|slot| window as f64 * self.length_s + slot as f64 * period_s).collect()
+    /// Start and end of a window.
+    pub(super) fn interval_s(&self, window: usize) -> [f64; 2] {
+        [window, window + 1].map(|index| index as f64 * self.length_s)
+    }
+
+    /// Keyframes of an interval, evenly thinned.
+    fn used(&self, mut times_s: Vec<f64>) -> Vec<f64> {
+        let step = self.thinning.max(times_s.len().div_ceil(MAX_KEYFRAMES));
+        let mut index = 0;
+        times_s.retain(|_| {
+            index += 1;
+            (index - 1) % step == 0
+        });
+        times_s
     }
 
     /// Windows that overlap an interval.
@@ -72,15 +86,76 @@ pub(super) fn trajectory(situation: &Situation, motion: &MotionSplines) -> Traje
     motion.trajectory(Vector3::zeros(), 0.0, situation.gravity_in_world.norm())
 }
 
-/// Information matrix (n × n, in column units) of frames at these times of a planned motion; `None` when it is not
-/// finite.
-pub(super) fn information_of_frames(
+/// Rows of the measurements of an interval over the motion of the IMU (pose, velocity, biases) at its start, over that at
+/// its end, and over the calibration.
+#[derive(Clone, Debug)]
+pub(super) struct WindowRows {
+    rows: DMatrix<f64>,
+}
+
+/// Columns of the motion of the IMU at one time.
+const MOTION: usize = 15;
+
+/// Rows of an interval with keyframes at these times, the first one at its start; the motion at its end is measured by
+/// the IMU alone. `None` when a number is not finite.
+pub(super) fn rows_of_keyframes(
+    situation: &Situation,
+    motion: &MotionSplines,
+    trajectory: &Trajectory,
+    (times_s, end_s): (&[f64], f64),
+    features: usize,
+) -> Option<WindowRows> {
+    let frames = frames(situation, motion, trajectory, &[times_s, &[end_s]].concat());
+    // Readings at images that do not become keyframes are carried to the next one.
+    let images = (end_s - times_s[0]) / situation.image_period_s / times_s.len() as f64;
+    let joints = match situation.encoders {
+        JointKnowledge::Encoder(sigma_rad) => JointKnowledge::Encoder(sigma_rad / images.max(1.0).sqrt()),
+        other => other,
+    };
+    let linearization = predicted_linearization(situation, frames, joints, features);
+    let [first, last] = [0, times_s.len()].map(FrameId);
+    let kept =
+        [ColumnId::Pose(first), ColumnId::VelocityBias(first), ColumnId::Pose(last), ColumnId::VelocityBias(last)];
+    Some(WindowRows { rows: measured_rows(&linearization, &kept)? })
+}
+
+/// Rows of an interval with the keyframes that the estimator makes in it.
+pub(super) fn rows_of_interval(
+    situation: &Situation,
+    motion: &MotionSplines,
+    trajectory: &Trajectory,
+    layout: &WindowLayout,
+    interval_s: [f64; 2],
+) -> Option<WindowRows> {
+    let times_s = layout.used(keyframe_times_s(situation, motion, trajectory, interval_s));
+    rows_of_keyframes(situation, motion, trajectory, (&times_s, interval_s[1]), layout.features)
+}
+
+/// Information matrix of the calibration (n × n, in column units) from consecutive windows: each starts with what those
+/// before it have measured of the motion of the IMU.
+pub(super) fn joined<'a>(windows: impl IntoIterator<Item = &'a WindowRows>, columns: usize) -> DMatrix<f64> {
+    // Over the motion at the last frame so far and the calibration.
+    let mut carried = DMatrix::zeros(0, MOTION + columns);
+    for window in windows {
+        let rows = &window.rows;
+        let (before, own) = (carried.nrows(), rows.nrows());
+        let mut stacked = DMatrix::zeros(before + own, rows.ncols());
+        stacked.view_mut((0, 0), (before, MOTION)).copy_from(&carried.columns(0, MOTION));
+        stacked.view_mut((0, 2 * MOTION), (before, columns)).copy_from(&carried.columns(MOTION, columns));
+        stacked.rows_mut(before, own).copy_from(rows);
+        carried = without_leading(&stacked, MOTION);
+    }
+    let calibration = without_leading(&carried, MOTION);
+    calibration.tr_mul(&calibration)
+}
+
+/// Frames at these times of a planned motion, with the samples of the IMU between them.
+fn frames(
     situation: &Situation,
     motion: &MotionSplines,
     trajectory: &Trajectory,
     times_s: &[f64],
-    landmarks: usize,
-) -> Option<DMatrix<f64>> {
+) -> Vec<HypotheticalFrame> {
     let bias = situation.navigation.bias;
     let sample = |time_s: f64| {
         let kinematics = trajectory.at(time_s);
@@ -94,7 +169,7 @@ pub(super) fn information_of_frames(
         let count = ((to_s - from_s) * IMU_RATE_HZ).round().max(1.0) as usize;
         (0..=count).map(|index| sample(from_s + (to_s - from_s) * index as f64 / count as f64)).collect()
     };
-    let frames = times_s.iter().enumerate().map(|(slot, time_s)| {
+    let frame = |(slot, time_s): (usize, &f64)| {
         let kinematics = trajectory.at(*time_s);
         let world_from_imu: RigidTransform = kinematics.world_from_imu;
         HypotheticalFrame {
@@ -104,22 +179,6 @@ pub(super) fn information_of_frames(
             imu: slot.checked_sub(1).map_or_else(Vec::new, |before| samples(times_s[before], *time_s)),
             camera_imu: None,
         }
-    });
-    predicted_information(situation, frames.collect(), landmarks)
-}
-
-/// Information of one window of a planned motion.
-pub(super) fn information_of_window(
-    situation: &Situation,
-    motion: &MotionSplines,
-    trajectory: &Trajectory,
-    layout: &WindowLayout,
-    window: usize,
-) -> Option<DMatrix<f64>> {
-    information_of_frames(situation, motion, trajectory, &layout.times_s(window), layout.landmarks)
-}
-
-/// Sum in the order of the windows.
-pub(super) fn sum<'a>(windows: impl IntoIterator<Item = &'a DMatrix<f64>>, columns: usize) -> DMatrix<f64> {
-    windows.into_iter().fold(DMatrix::zeros(columns, columns), |sum, window| sum + window)
+    };
+    times_s.iter().enumerate().map(frame).collect()
 }
