@@ -18,6 +18,8 @@ use crate::text::Named;
 pub(crate) const GRAVITY_M_PER_S2: f64 = 9.81;
 /// Rate of the IMU and of the encoders.
 pub(crate) const IMU_RATE_HZ: f64 = 200.0;
+/// Topic of the ground truth.
+pub(crate) const GROUND_TRUTH_TOPIC: &str = "/ground_truth/odometry";
 /// Topic of the encoders.
 pub(crate) const JOINT_TOPIC: &str = "/gimbal/joint_states";
 /// Image size of the intrinsics below.
@@ -125,7 +127,7 @@ impl Equipment {
             gimbal_imu: (self.gimbal_camera && self.gimbal_imu).then(gimbal_imu),
             cameras,
             gimbal,
-            ground_truth_topic: Some("/ground_truth/odometry".to_owned()),
+            ground_truth_topic: Some(GROUND_TRUTH_TOPIC.to_owned()),
             ground_truth_use_log_time: false,
             ground_truth_lever_arm: None,
             assumed: Vec::new(),

@@ -2,14 +2,12 @@
 
 use nalgebra::Vector2;
 
-use super::equipment::{GRAVITY_M_PER_S2, JOINT_TOPIC};
+use super::equipment::{GRAVITY_M_PER_S2, GROUND_TRUTH_TOPIC, JOINT_TOPIC};
 use super::error::SimulationError;
 use super::options::SimulationOptions;
 use crate::camera::CameraModel;
 use crate::sensors::{CameraMount, CameraRig, ChainPrior, GimbalRig, ImuIntrinsics, Rig};
 
-/// Topic of the ground truth in simulated logs.
-const GROUND_TRUTH_TOPIC: &str = "/ground_truth/odometry";
 /// Largest angle between a ray and the optical axis that is rendered: the grid of samples grows with its tangent.
 const MAX_RAY_RAD: f64 = 70.0 * std::f64::consts::PI / 180.0;
 

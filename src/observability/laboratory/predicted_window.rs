@@ -27,7 +27,7 @@ pub(super) fn predicted_information(
 ) -> Option<DMatrix<f64>> {
     let poses = camera_poses(situation, &frames);
     let mut landmarks = Vec::new();
-    let mut view = SceneView::new(situation, &poses);
+    let mut view = PredictedView::new(situation, &poses);
     for index in 0..landmarks_per_frame * poses.len() {
         landmarks.extend(view.draw(index % poses.len(), 0));
     }
@@ -49,7 +49,7 @@ pub(super) fn predicted_linearization(
 ) -> Linearization {
     let poses = camera_poses(situation, &frames[..frames.len() - 1]);
     let mut landmarks: Vec<HypotheticalLandmark> = Vec::new();
-    let mut view = SceneView::new(situation, &poses);
+    let mut view = PredictedView::new(situation, &poses);
     for slot in 0..poses.len() {
         let seen = landmarks.iter().filter(|landmark| landmark.observers.contains(&slot)).count();
         for _ in seen..features {
@@ -88,13 +88,13 @@ fn linearization(
 }
 
 /// Landmarks in the views of cameras, at the distances of the scene.
-struct SceneView<'a> {
+struct PredictedView<'a> {
     situation: &'a Situation,
     poses: &'a [RigidTransform],
     drawn: usize,
 }
 
-impl<'a> SceneView<'a> {
+impl<'a> PredictedView<'a> {
     fn new(situation: &'a Situation, poses: &'a [RigidTransform]) -> Self {
         Self { situation, poses, drawn: 0 }
     }
