@@ -10,7 +10,7 @@ use super::moves::{HandMove, combined};
 use super::search::SearchProblem;
 use super::starts;
 use super::summary::{PlanTable, SigmaRow};
-use super::windows::{joined, rows_of_interval, trajectory};
+use super::windows::{WindowRows, joined, rows_of_interval, trajectory};
 use crate::simulation::MotionSplines;
 
 /// Moves for a person, with the predicted σ after each.
@@ -40,29 +40,26 @@ pub struct HandStep {
     pub worst_ratio: f64,
 }
 
-/// Chooses the move of each window that lowers the criterion most after those before; every move starts from rest, and
-/// without the measurements of the motion before it.
+/// Chooses the move of each window that lowers the criterion most after those before; every move starts and ends at rest.
 pub(super) fn choose(problem: &SearchProblem<'_>, duration_s: f64) -> Vec<HandMove> {
     let &SearchProblem { situation, objective, ref layout, .. } = problem;
     let columns = situation.information.ncols();
-    let of = |choice: HandMove| {
-        // The second window of the continued move: it grows to its size in the first one.
-        let motion = starts::as_described(problem, duration_s, &[choice]);
-        let interval_s = layout.interval_s(usize::from(layout.count > 1));
-        let rows = rows_of_interval(situation, &motion, &trajectory(situation, &motion), layout, interval_s)?;
-        Some((choice, joined([&rows], columns)))
-    };
-    let moves: Vec<(HandMove, DMatrix<f64>)> = combined(situation).into_par_iter().filter_map(of).collect();
-    let mut chosen = Vec::new();
-    let mut before = DMatrix::zeros(columns, columns);
-    for _ in 0..layout.count {
-        let value = |gained: &DMatrix<f64>| objective.search_value(&(&before + gained)).unwrap_or(f64::INFINITY);
-        let values: Vec<f64> = moves.iter().map(|(_, gained)| value(gained)).collect();
+    let candidates = combined(situation);
+    let mut chosen: Vec<HandMove> = Vec::new();
+    let mut windows: Vec<WindowRows> = Vec::new();
+    for window in 0..layout.count {
+        let evaluated = candidates.par_iter().map(|candidate| {
+            let motion = starts::as_described(problem, duration_s, &[chosen.as_slice(), &[*candidate]].concat());
+            let flight = trajectory(situation, &motion);
+            let rows = rows_of_interval(situation, &motion, &flight, layout, layout.interval_s(window))?;
+            let value = objective.search_value(&joined(windows.iter().chain([&rows]), columns))?;
+            Some((value, *candidate, rows))
+        });
+        let evaluated: Vec<(f64, HandMove, WindowRows)> = evaluated.flatten().collect();
         // The first of equal moves.
-        let best = (0..moves.len()).min_by(|a, b| values[*a].total_cmp(&values[*b]));
-        let Some(best) = best.filter(|best| values[*best].is_finite()) else { break };
-        chosen.push(moves[best].0);
-        before += &moves[best].1;
+        let Some((_, best, rows)) = evaluated.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)) else { break };
+        chosen.push(best);
+        windows.push(rows);
     }
     chosen
 }
