@@ -30,6 +30,7 @@ def simulate(
     mirror: bool = False,
     static_camera: bool = True,
     motion: Optional[StrPath] = None,
+    rig: Optional[StrPath] = None,
     disturb: Union[Mapping[str, object], Sequence[str]] = (),
     force: bool = False,
 ) -> Flight:
@@ -54,6 +55,7 @@ def simulate(
         mirror=mirror,
         no_static_camera=not static_camera,
         motion=motion,
+        rig=rig,
         disturb=disturbances,
         force=force,
     )
