@@ -228,8 +228,16 @@ fn a_motion_is_saved_and_opened_and_other_joints_are_refused() {
     assert_ne!(sigmas(&harness), sigmas_before);
     harness.state_mut().0.open_motion(file.clone());
     harness.run_steps(3);
+    let read = motion(&harness);
+    for (channel, index) in
+        (0..written.channel_count()).flat_map(|it| (0..written.point_count()).map(move |at| (it, at)))
+    {
+        let (before, after) = (written.point(channel, index), read.point(channel, index));
+        assert!((before - after).abs() < 1e-6, "{channel}, {index}: {before} {after}");
+    }
+    // A keyframe begins where the parallax exceeds a threshold: rounding may move one by an image.
     for (before, after) in sigmas_before.iter().zip(&sigmas(&harness)) {
-        assert!((before / after - 1.0).abs() < 1e-6, "{before} {after}");
+        assert!((before / after - 1.0).abs() < 0.03, "{before} {after}");
     }
     assert!(harness.query_by_label("The curves are those of the file").is_some());
     let other = PrescribedMotion { joint_names: vec!["a".into(), "b".into(), "c".into()], ..file };
