@@ -48,11 +48,9 @@ pub fn write_run(
 ) -> Result<(PathBuf, RunSummary), ExportError> {
     let mut outputs = OutputSet::default();
     let (folder, summary) = stage_run(recording, run, folder, options, &mut outputs)?;
+    let paths = outputs.paths();
     outputs.commit().map_err(ExportError::commit)?;
-    remove_unwritten(&folder, options)?;
-    if run.posterior.is_none() {
-        remove_others(&[POSTERIOR], &[], &folder)?;
-    }
+    remove_unwritten(&folder, &paths)?;
     Ok((folder, summary))
 }
 
@@ -101,13 +99,7 @@ pub(crate) fn stage_run(
     Ok((folder, summary))
 }
 
-/// Removes the files that an earlier run with other options left in the folder of a run.
-pub(crate) fn remove_unwritten(folder: &Path, options: RunFileOptions) -> Result<(), ExportError> {
-    for (name, written) in [(EUROC_TRAJECTORY, options.euroc_trajectory), (RESULTS, options.mcap)] {
-        let path = folder.join(name);
-        if !written && path.is_file() {
-            fs::remove_file(&path).map_err(ExportError::write(&path))?;
-        }
-    }
-    Ok(())
+/// Removes the files that an earlier run left in the folder of a run and that are not among the `written` ones.
+pub(crate) fn remove_unwritten(folder: &Path, written: &[PathBuf]) -> Result<(), ExportError> {
+    remove_others(&[EUROC_TRAJECTORY, RESULTS, POSTERIOR], written, folder)
 }

@@ -61,7 +61,7 @@ pub fn write_report(
     let paths = outputs.paths();
     outputs.commit().map_err(ExportError::commit)?;
     let labels: Vec<&str> = recording.runs.iter().map(|run| run.spec.label.as_str()).collect();
-    remove_earlier(folder, &labels, &earlier_runs, &content.log)?;
+    remove_earlier(folder, (&labels, &earlier_runs), &paths, &content.log)?;
     Ok(paths)
 }
 
@@ -87,14 +87,20 @@ pub fn write_known_report(
     }
     let paths = outputs.paths();
     outputs.commit().map_err(ExportError::commit)?;
-    remove_earlier(folder, labels, &earlier_runs, log)?;
+    remove_earlier(folder, (labels, &earlier_runs), &paths, log)?;
     Ok(paths)
 }
 
-/// Removes files of an earlier report that are not part of this one, which has runs with these labels.
-fn remove_earlier(folder: &Path, labels: &[&str], earlier_runs: &[String], log: &str) -> Result<(), ExportError> {
+/// Removes files of an earlier report that are not part of this one, which has the files `written` and runs with the first
+/// labels.
+fn remove_earlier(
+    folder: &Path,
+    (labels, earlier_runs): (&[&str], &[String]),
+    written: &[PathBuf],
+    log: &str,
+) -> Result<(), ExportError> {
     for label in labels {
-        remove_unwritten(&folder.join(label), RUN_OPTIONS)?;
+        remove_unwritten(&folder.join(label), written)?;
     }
     for label in earlier_runs.iter().filter(|label| !labels.contains(&label.as_str())) {
         remove_run(&folder.join(label), log)?;
