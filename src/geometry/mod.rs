@@ -23,7 +23,7 @@ pub use rigid_transform::RigidTransform;
 pub(crate) use scalars::planar_length;
 pub use scalars::{
     MEDIAN_PLANAR_LENGTH, SIGMA_PER_MEDIAN, mean_square_quantile, median, ns_from_seconds, principal_angle, quantile,
-    seconds_from_ns, tangent_basis, vertical_angle, wrap_angle,
+    seconds_from_ns, smooth_step, tangent_basis, vertical_angle, wrap_angle,
 };
 pub use signed_axes::SignedAxes;
 pub use split_mix::SplitMix64;

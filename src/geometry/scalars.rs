@@ -14,6 +14,11 @@ pub fn ns_from_seconds(time_s: f64) -> i64 {
     (time_s * 1e9).round() as i64
 }
 
+/// Rise from 0 to 1 over the same range of `fraction`, with first and second derivatives of zero at both ends.
+pub fn smooth_step(fraction: f64) -> f64 {
+    fraction * fraction * fraction * (fraction * (fraction * 6.0 - 15.0) + 10.0)
+}
+
 /// Returns the equivalent angle in [−π, π), in radians; π becomes −π. An angle already in this range is
 /// returned bit by bit.
 pub fn wrap_angle(angle_rad: f64) -> f64 {

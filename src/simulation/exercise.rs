@@ -4,6 +4,8 @@ use std::f64::consts::TAU;
 
 use nalgebra::Vector3;
 
+use crate::geometry::smooth_step;
+
 /// Swing of the vehicle; a multirotor tilts to accelerate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum VehicleSwing {
@@ -61,8 +63,7 @@ const GROWTH_S: f64 = 1.0;
 
 fn swing(time_s: f64, period_s: f64) -> f64 {
     let fraction = (time_s / GROWTH_S).clamp(0.0, 1.0);
-    let grown = fraction * fraction * fraction * (fraction * (fraction * 6.0 - 15.0) + 10.0);
-    grown * (TAU * time_s / period_s).sin()
+    smooth_step(fraction) * (TAU * time_s / period_s).sin()
 }
 
 impl Exercise {

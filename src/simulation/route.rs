@@ -4,7 +4,7 @@ use nalgebra::{Vector2, Vector3};
 
 use super::exercise::Exercise;
 use super::random::RandomStream;
-use crate::geometry::wrap_angle;
+use crate::geometry::{smooth_step, wrap_angle};
 
 /// Reference position and heading of a flight at one time.
 #[derive(Clone, Copy, Debug)]
@@ -78,7 +78,7 @@ impl Manoeuvres {
     /// Progress of the ramp: 0 while hovering, 1 at full velocity, smooth in between.
     pub(crate) fn liveliness(&self, time_s: f64) -> f64 {
         let fraction = ((time_s - self.hover_s) / self.ramp_s).clamp(0.0, 1.0);
-        fraction * fraction * fraction * (fraction * (fraction * 6.0 - 15.0) + 10.0)
+        smooth_step(fraction)
     }
 
     /// Equivalent time at full velocity; its derivative is [`Self::liveliness`].

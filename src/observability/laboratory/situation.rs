@@ -113,6 +113,11 @@ impl Situation {
         })
     }
 
+    /// Names of the joints, from base to end effector.
+    pub fn joint_names(&self) -> Vec<String> {
+        self.joints.iter().map(|joint| joint.name.clone()).collect()
+    }
+
     /// State before a flight: the IMU at rest at the origin and level, with the calibration known as well as the prior.
     ///
     /// `joints` has one entry per joint of the configured chain. The joints start in the middle: at zero, moved so that

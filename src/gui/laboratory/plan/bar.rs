@@ -1,37 +1,29 @@
 //! Buttons of the planned motion: start, undo, optimization and files.
 
 use std::path::PathBuf;
-use std::sync::Arc;
 
 use egui::{Button, CollapsingHeader, ComboBox, DragValue, ProgressBar, RichText, Role, TextEdit, Ui, WidgetInfo};
 
 use super::super::request::MotionRequest;
 use super::edited::EditedMotion;
 use super::worker::PlanSearch;
-use super::{PlanView, WIDTHS_S};
+use super::{PlanInputs, PlanView, WIDTHS_S};
 use crate::gui::PanelContext;
 use crate::gui::help::terms::window;
 use crate::gui::units::fixed;
-use crate::observability::laboratory::{MotionLimits, MotionProblem, MotionStart};
+use crate::observability::laboratory::{MotionProblem, MotionStart};
 use crate::text::Named as _;
 
 /// Width of the field for the file in points.
 const PATH_WIDTH: f32 = 260.0;
 
-/// Button of the history: whether it is enabled, its name, its hint and its effect.
+/// Button of the history: true if it is enabled, its name, its hint and its effect.
 type HistoryButton = (bool, &'static str, &'static str, fn(&mut EditedMotion));
 
 impl PlanView {
-    pub(super) fn bar_ui(
-        &mut self,
-        ui: &mut Ui,
-        ctx: &PanelContext<'_>,
-        problem: &Arc<MotionProblem>,
-        limits: &MotionLimits,
-        in_background: bool,
-    ) {
+    pub(super) fn bar_ui(&mut self, ui: &mut Ui, ctx: &PanelContext<'_>, inputs: PlanInputs<'_>) {
         ui.horizontal_wrapped(|ui| {
-            self.search_ui(ui, ctx, problem, limits, in_background);
+            self.search_ui(ui, ctx, inputs);
             ui.separator();
             self.undo_ui(ui);
             let name = ui.label("Width");
@@ -39,30 +31,23 @@ impl PlanView {
             let width = DragValue::new(&mut self.width_s).range(least..=most).speed(0.02).suffix(" s").max_decimals(2);
             ui.add(width).labelled_by(name.id).on_hover_text(window::PLAN_WIDTH.meaning);
             ui.separator();
-            self.start_ui(ui, problem, limits, in_background);
-            if let Some(latency_s) = self.predictions.latency_s().filter(|_| in_background) {
+            self.start_ui(ui, inputs);
+            if let Some(latency_s) = self.predictions.latency_s().filter(|_| inputs.in_background) {
                 let text = format!("σ in {} ms", fixed(1e3 * latency_s, 0));
                 ui.label(RichText::new(text).small().color(ctx.theme.text_weak))
                     .on_hover_text("Time from the last change of the motion to its predicted σ");
             }
         });
-        self.file_ui(ui, ctx, problem);
+        self.file_ui(ui, ctx, inputs.problem);
     }
 
     /// Starts and stops the optimization.
-    fn search_ui(
-        &mut self,
-        ui: &mut Ui,
-        ctx: &PanelContext<'_>,
-        problem: &Arc<MotionProblem>,
-        limits: &MotionLimits,
-        in_background: bool,
-    ) {
+    fn search_ui(&mut self, ui: &mut Ui, ctx: &PanelContext<'_>, inputs: PlanInputs<'_>) {
         let Some(search) = &self.search else {
             let button = ui.add(Button::new(RichText::new("Optimize from here").color(ctx.theme.accent)));
             if button.on_hover_text(window::PLAN_OPTIMIZE.meaning).clicked() {
                 let kind = PlanSearch::Improve { trials: self.trials };
-                self.start_search(ui, kind, problem, limits, in_background);
+                self.start_search(ui, kind, inputs);
             }
             return;
         };
@@ -98,7 +83,7 @@ impl PlanView {
     }
 
     /// Chooses the motion from which to start.
-    fn start_ui(&mut self, ui: &mut Ui, problem: &Arc<MotionProblem>, limits: &MotionLimits, in_background: bool) {
+    fn start_ui(&mut self, ui: &mut Ui, inputs: PlanInputs<'_>) {
         let name = ui.label("Start");
         let combo = ComboBox::from_id_salt("start of the motion").width(120.0);
         let shown = combo.selected_text(self.settings.start.name()).show_ui(ui, |ui| {
@@ -109,7 +94,7 @@ impl PlanView {
         shown.response.labelled_by(name.id).on_hover_text(window::PLAN_START.meaning);
         let begin = ui.add_enabled(self.search.is_none(), Button::new("Begin with it"));
         if begin.on_hover_text("Replace the motion by this start").clicked() {
-            self.start_search(ui, PlanSearch::Start(self.settings.start), problem, limits, in_background);
+            self.start_search(ui, PlanSearch::Start(self.settings.start), inputs);
         }
     }
 
@@ -134,7 +119,7 @@ impl PlanView {
             let is_named = !file.as_os_str().is_empty();
             let save = ui.add_enabled(is_named && self.search.is_none(), Button::new("Save motion"));
             if save.on_hover_text(window::PLAN_FILE.meaning).clicked() {
-                let joint_names = problem.situation().joints.iter().map(|joint| joint.name.clone()).collect();
+                let joint_names = problem.situation().joint_names();
                 let motion = edited.current().clone();
                 self.request = Some(MotionRequest::Write { path: file.clone(), motion, joint_names });
             }

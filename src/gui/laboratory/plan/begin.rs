@@ -45,7 +45,7 @@ impl PlanView {
     /// Curves through the rows of a file, with points that can be dragged.
     fn motion_of_file(&mut self, file: &PrescribedMotion, problem: &MotionProblem) -> Result<MotionSplines, String> {
         file.check()?;
-        let names: Vec<String> = problem.situation().joints.iter().map(|joint| joint.name.clone()).collect();
+        let names = problem.situation().joint_names();
         let file = file.with_joints(&names)?;
         let [shortest_s, longest_s] = PLAN_DURATION_S;
         if !(shortest_s..=longest_s).contains(&file.duration_s()) {

@@ -29,7 +29,7 @@ const RADII: [f32; 2] = [2.5, 5.0];
 /// Steps of a key between the limits of a channel.
 const KEY_STEPS: f64 = 50.0;
 
-/// What the curves are drawn with beside the motion.
+/// Inputs of the curves beside the motion.
 pub(super) struct CurveInputs<'a> {
     pub(super) situation: &'a Situation,
     pub(super) limits: &'a MotionLimits,

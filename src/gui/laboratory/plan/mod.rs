@@ -43,6 +43,14 @@ const BELOW_CURVES: f32 = 40.0;
 /// Least half width of a change in seconds, and the largest.
 const WIDTHS_S: [f64; 2] = [0.1, 5.0];
 
+/// Problem and limits of searches, and true if they run on threads of their own.
+#[derive(Clone, Copy)]
+struct PlanInputs<'a> {
+    problem: &'a Arc<MotionProblem>,
+    limits: &'a MotionLimits,
+    in_background: bool,
+}
+
 /// State of the planned motion.
 pub(super) struct PlanView {
     settings: PlanSettings,
@@ -64,7 +72,7 @@ pub(super) struct PlanView {
     opened: Option<Arc<PrescribedMotion>>,
     /// File of the motion as typed; `None` before the first frame.
     path: Option<String>,
-    /// What happened to the last file, and whether it is a problem.
+    /// Result of reading the last file, and true for a problem.
     message: Option<(String, bool)>,
     pub(super) request: Option<MotionRequest>,
 }
@@ -123,7 +131,7 @@ impl PlanView {
         };
         let limits = self.settings.limits(problem.situation());
         if !is_figure {
-            self.bar_ui(ui, ctx, &problem, &limits, in_background);
+            self.bar_ui(ui, ctx, PlanInputs { problem: &problem, limits: &limits, in_background });
             self.settings_ui(ui);
         }
         let whole = ui.available_rect_before_wrap();
@@ -189,9 +197,7 @@ impl PlanView {
         &mut self,
         ui: &Ui,
         kind: PlanSearch,
-        problem: &Arc<MotionProblem>,
-        limits: &MotionLimits,
-        in_background: bool,
+        PlanInputs { problem, limits, in_background }: PlanInputs<'_>,
     ) {
         let Some(edited) = &self.edited else { return };
         self.before = self.predictions.last().cloned();
@@ -236,7 +242,7 @@ impl PlanView {
     fn limits_ui(&mut self, ui: &mut Ui, ctx: &PanelContext<'_>, problem: &MotionProblem, limits: &MotionLimits) {
         let Some(motion) = self.edited.as_ref().map(EditedMotion::current) else { return };
         if self.reached.as_ref().is_none_or(|(of, under, _)| of != motion || under != limits) {
-            let names: Vec<String> = problem.situation().joints.iter().map(|joint| joint.name.clone()).collect();
+            let names = problem.situation().joint_names();
             self.reached = Some((motion.clone(), limits.clone(), limits.compare(motion, &names)));
         }
         let reached = self.reached.as_ref().map_or(&[][..], |(_, _, reached)| reached);

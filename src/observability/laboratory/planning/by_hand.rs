@@ -10,7 +10,7 @@ use super::moves::{HandMove, combined};
 use super::search::SearchProblem;
 use super::starts;
 use super::summary::{PlanTable, SigmaRow};
-use super::windows::{WindowRows, joined, rows_of_interval, trajectory};
+use super::windows::{WindowRows, joined, rows_of_window, trajectory};
 use crate::simulation::MotionSplines;
 
 /// Moves for a person, with the predicted σ after each.
@@ -51,7 +51,7 @@ pub(super) fn choose(problem: &SearchProblem<'_>, duration_s: f64) -> Vec<HandMo
         let evaluated = candidates.par_iter().map(|candidate| {
             let motion = starts::as_described(problem, duration_s, &[chosen.as_slice(), &[*candidate]].concat());
             let flight = trajectory(situation, &motion);
-            let rows = rows_of_interval(situation, &motion, &flight, layout, layout.interval_s(window))?;
+            let rows = rows_of_window(situation, &motion, &flight, layout, window)?;
             let value = objective.search_value(&joined(windows.iter().chain([&rows]), columns))?;
             Some((value, *candidate, rows))
         });

@@ -2,7 +2,6 @@
 
 use std::fmt;
 use std::ops::ControlFlow;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -13,7 +12,7 @@ use super::by_hand::{HandPlan, choose};
 use super::limits::{MotionLimits, ReachedLimit};
 use super::objective::{Objective, PlanCriterion};
 use super::repeated::RepeatedMove;
-use super::search::{SearchProblem, SearchedMotion};
+use super::search::{FINE_WEIGHT, SearchProblem, SearchProgress, SearchedMotion};
 use super::starts;
 use super::summary::{PlanTable, SigmaRow};
 use super::windows::{WindowLayout, joined, rows_of_interval, trajectory};
@@ -131,16 +130,8 @@ pub fn plan_motion(
     let repeated = RepeatedMove::all(&fine, options.duration_s);
     let begun = begin(&coarse, options, &repeated);
     let finalists = FINALISTS.min(begun.len());
-    // A trial with fine windows takes about four times as long.
-    let total = options.trials * (begun.len() + 4 * finalists);
-    let (done, is_stopped) = (AtomicUsize::new(0), AtomicBool::new(false));
-    let step = |weight: usize| {
-        let done = done.fetch_add(weight, Ordering::Relaxed) + weight;
-        if watch(done as f64 / total.max(1) as f64).is_break() {
-            is_stopped.store(true, Ordering::Relaxed);
-        }
-        is_stopped.load(Ordering::Relaxed)
-    };
+    let progress = SearchProgress::new(options.trials * (begun.len() + FINE_WEIGHT * finalists));
+    let step = |weight: usize| progress.step(weight, watch);
     let random = |part: u64, index: usize| random_of(options.seed, 100 * part + index as u64);
     let search = |(index, (origin, start)): (usize, (String, MotionSplines))| {
         let before = fine.evaluate(start.clone())?;
@@ -157,14 +148,14 @@ pub fn plan_motion(
         if index >= finalists {
             return Some((start, found));
         }
-        let found = fine.improve(found, options.trials, &mut random(2, index), &|_| step(4));
+        let found = fine.improve(found, options.trials, &mut random(2, index), &|_| step(FINE_WEIGHT));
         let after = objective.value(&fine.total(&found.windows))?;
         Some((PlanStart { after, ..start }, found))
     };
     let mut refined: Vec<(PlanStart, SearchedMotion)> =
         searched.into_par_iter().enumerate().filter_map(refine).collect();
     refined.sort_by(|a, b| a.0.after.total_cmp(&b.0.after));
-    if is_stopped.load(Ordering::Relaxed) {
+    if progress.is_stopped() {
         return Err(MotionPlanError::Interrupted);
     }
     let starts = refined.iter().map(|(start, _)| start.clone()).collect();
@@ -177,14 +168,24 @@ fn random_of(seed: u64, part: u64) -> SplitMix64 {
     SplitMix64::new(seed.wrapping_mul(1000).wrapping_add(part))
 }
 
+/// Criterion over these parameters, or over all if none is given, and windows of motions of this duration.
+pub(super) fn objective_and_windows(
+    situation: &Situation,
+    duration_s: f64,
+    criterion: PlanCriterion,
+    parameters: &[ParameterId],
+) -> Result<(Objective, WindowLayout), MotionPlanError> {
+    let [shortest_s, longest_s] = PLAN_DURATION_S;
+    if !(shortest_s..=longest_s).contains(&duration_s) {
+        return Err(MotionPlanError::Duration { given: duration_s });
+    }
+    let objective = Objective::new(situation, criterion, parameters).ok_or(MotionPlanError::NothingObservable)?;
+    Ok((objective, WindowLayout::fine(duration_s)))
+}
+
 /// Criterion and windows of a plan.
 fn problem(situation: &Situation, options: &PlanOptions) -> Result<(Objective, WindowLayout), MotionPlanError> {
-    let [shortest_s, longest_s] = PLAN_DURATION_S;
-    if !(shortest_s..=longest_s).contains(&options.duration_s) {
-        return Err(MotionPlanError::Duration { given: options.duration_s });
-    }
-    let objective = Objective::new(situation, options.criterion, &options.parameters);
-    Ok((objective.ok_or(MotionPlanError::NothingObservable)?, WindowLayout::fine(options.duration_s)))
+    objective_and_windows(situation, options.duration_s, options.criterion, &options.parameters)
 }
 
 /// Motions from which the search starts, each with its origin.
@@ -224,7 +225,7 @@ fn finished(
     repeated: &[RepeatedMove],
 ) -> Option<Result<MotionPlan, MotionPlanError>> {
     let (situation, objective) = (fine.situation, fine.objective);
-    let names: Vec<String> = situation.joints.iter().map(|joint| joint.name.clone()).collect();
+    let names = situation.joint_names();
     let limits = fine.limits.compare(&best.motion, &names);
     if let Some(exceeded) = limits.iter().find(|limit| !limit.is_kept()) {
         return Some(Err(MotionPlanError::LimitTooTight { quantity: exceeded.quantity.clone() }));

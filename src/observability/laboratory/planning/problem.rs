@@ -2,7 +2,6 @@
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -11,19 +10,17 @@ use super::super::Situation;
 use super::by_hand::choose;
 use super::limits::MotionLimits;
 use super::objective::{Objective, PlanCriterion};
-use super::plan::{MotionPlanError, PLAN_DURATION_S};
-use super::search::SearchProblem;
+use super::plan::{MotionPlanError, objective_and_windows};
+use super::search::{FINE_WEIGHT, SearchProblem, SearchProgress};
 use super::starts;
 use super::summary::PlanTable;
-use super::windows::{WindowLayout, WindowRows, joined, rows_of_interval, trajectory};
+use super::windows::{WindowLayout, WindowRows, joined, rows_of_window, trajectory};
 use crate::geometry::SplitMix64;
 use crate::simulation::MotionSplines;
 use crate::text::Named;
 
-/// Ratio of coarse trials to fine ones of a search: a fine one takes about four times as long.
+/// Ratio of coarse trials to fine ones of a search.
 const COARSE_PER_FINE: usize = 3;
-/// Time of a fine trial in coarse ones.
-const FINE_WEIGHT: usize = 4;
 /// Seed of the random numbers of starts and searches.
 const SEED: u64 = 1;
 
@@ -78,17 +75,8 @@ impl MotionProblem {
     /// # Errors
     /// If the duration is out of range, or nothing is observable.
     pub fn new(situation: Situation, duration_s: f64) -> Result<Self, MotionPlanError> {
-        let [shortest_s, longest_s] = PLAN_DURATION_S;
-        if !(shortest_s..=longest_s).contains(&duration_s) {
-            return Err(MotionPlanError::Duration { given: duration_s });
-        }
-        let from_prior = Objective::new(&situation, PlanCriterion::Worst, &[]);
-        Ok(Self {
-            from_prior: from_prior.ok_or(MotionPlanError::NothingObservable)?,
-            situation: Arc::new(situation),
-            layout: WindowLayout::fine(duration_s),
-            after_flight: None,
-        })
+        let (from_prior, layout) = objective_and_windows(&situation, duration_s, PlanCriterion::Worst, &[])?;
+        Ok(Self { from_prior, situation: Arc::new(situation), layout, after_flight: None })
     }
 
     /// The same problem after a flight whose state at its end this is; `None` if the flight estimates other parameters.
@@ -133,15 +121,8 @@ impl MotionProblem {
         let fine = self.search(limits);
         let coarse = SearchProblem { layout: WindowLayout::coarse(motion.duration_s()), ..fine };
         let fine_trials = trials.div_ceil(COARSE_PER_FINE);
-        let total = trials + FINE_WEIGHT * fine_trials;
-        let (done, is_stopped) = (AtomicUsize::new(0), AtomicBool::new(false));
-        let step = |weight: usize, best: &MotionSplines| {
-            let done = done.fetch_add(weight, Ordering::Relaxed) + weight;
-            if watch(done as f64 / total.max(1) as f64, best).is_break() {
-                is_stopped.store(true, Ordering::Relaxed);
-            }
-            is_stopped.load(Ordering::Relaxed)
-        };
+        let progress = SearchProgress::new(trials + FINE_WEIGHT * fine_trials);
+        let step = |weight: usize, best: &MotionSplines| progress.step(weight, |ratio| watch(ratio, best));
         let mut random = SplitMix64::new(SEED);
         let begin = fine.evaluate(fine.within_limits(motion.clone()))?;
         let start = coarse.evaluate(begin.motion.clone())?;
@@ -149,7 +130,7 @@ impl MotionProblem {
         let found = fine.evaluate(found.motion)?;
         // Coarse windows may prefer another motion than fine ones.
         let found = if found.value < begin.value { found } else { begin };
-        if is_stopped.load(Ordering::Relaxed) {
+        if progress.is_stopped() {
             return Some(found.motion);
         }
         Some(fine.improve(found, fine_trials, &mut random, &|best| step(FINE_WEIGHT, best)).motion)
@@ -200,7 +181,7 @@ impl MotionPredictor {
         let flight = trajectory(situation, motion);
         let of = |window: usize| match &known {
             Some(known) if !changed[window] => Some(known.windows[window].clone()),
-            _ => rows_of_interval(situation, motion, &flight, layout, layout.interval_s(window)),
+            _ => rows_of_window(situation, motion, &flight, layout, window),
         };
         let windows: Vec<WindowRows> = (0..layout.count).into_par_iter().map(of).collect::<Option<_>>()?;
         let prediction = problem.prediction(&windows);

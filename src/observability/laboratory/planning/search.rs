@@ -3,12 +3,15 @@
 //! A trial adds a bump to the control values of one or two channels, within the limits, and is accepted if the criterion
 //! falls. Only the windows that the bump changes are linearized again.
 
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
 use nalgebra::DMatrix;
 
 use super::super::Situation;
 use super::limits::MotionLimits;
 use super::objective::Objective;
-use super::windows::{WindowLayout, WindowRows, joined, rows_of_interval, trajectory};
+use super::windows::{WindowLayout, WindowRows, joined, rows_of_window, trajectory};
 use crate::geometry::SplitMix64;
 use crate::simulation::MotionSplines;
 
@@ -28,6 +31,36 @@ const SIZE_FACTORS: [f64; 2] = [1.3, 0.97];
 const SIZES: [f64; 2] = [0.02, 0.6];
 /// Times that a bump beyond the limits is halved before the trial is given up.
 const HALVINGS: usize = 3;
+
+/// Time of a trial with fine windows in trials with coarse ones.
+pub(super) const FINE_WEIGHT: usize = 4;
+
+/// Progress of searches on several threads, which can be stopped.
+pub(super) struct SearchProgress {
+    /// Number of coarse trials of all searches together.
+    total: usize,
+    done: AtomicUsize,
+    is_stopped: AtomicBool,
+}
+
+impl SearchProgress {
+    pub(super) fn new(total: usize) -> Self {
+        Self { total, done: AtomicUsize::new(0), is_stopped: AtomicBool::new(false) }
+    }
+
+    /// Counts a trial and passes the ratio that is done to `watch`; true if it has stopped the searches.
+    pub(super) fn step(&self, weight: usize, watch: impl FnOnce(f64) -> ControlFlow<()>) -> bool {
+        let done = self.done.fetch_add(weight, Ordering::Relaxed) + weight;
+        if watch(done as f64 / self.total.max(1) as f64).is_break() {
+            self.is_stopped.store(true, Ordering::Relaxed);
+        }
+        self.is_stopped()
+    }
+
+    pub(super) fn is_stopped(&self) -> bool {
+        self.is_stopped.load(Ordering::Relaxed)
+    }
+}
 
 /// Inputs of a search, the same for all its starts.
 #[derive(Clone, Copy, Debug)]
@@ -68,8 +101,7 @@ impl SearchProblem<'_> {
     /// Rows of every window of a motion; `None` when a number is not finite.
     pub(super) fn evaluate(&self, motion: MotionSplines) -> Option<SearchedMotion> {
         let flight = trajectory(self.situation, &motion);
-        let of =
-            |window| rows_of_interval(self.situation, &motion, &flight, &self.layout, self.layout.interval_s(window));
+        let of = |window| rows_of_window(self.situation, &motion, &flight, &self.layout, window);
         let windows: Vec<WindowRows> = (0..self.layout.count).map(of).collect::<Option<_>>()?;
         let value = self.objective.search_value(&self.total(&windows))?;
         Some(SearchedMotion { motion, windows, value })
@@ -141,8 +173,7 @@ impl SearchProblem<'_> {
             is_changed[self.layout.within(reach_s(&motion, bump))].fill(true);
         }
         for (window, _) in is_changed.iter().enumerate().filter(|(_, is_changed)| **is_changed) {
-            windows[window] =
-                rows_of_interval(self.situation, &motion, &flight, &self.layout, self.layout.interval_s(window))?;
+            windows[window] = rows_of_window(self.situation, &motion, &flight, &self.layout, window)?;
         }
         let value = self.objective.search_value(&self.total(&windows))?;
         Some(SearchedMotion { motion, windows, value })

@@ -131,6 +131,17 @@ pub(super) fn rows_of_interval(
     rows_of_keyframes(situation, motion, trajectory, (&times_s, interval_s[1]), layout.features)
 }
 
+/// Rows of a whole window.
+pub(super) fn rows_of_window(
+    situation: &Situation,
+    motion: &MotionSplines,
+    trajectory: &Trajectory,
+    layout: &WindowLayout,
+    window: usize,
+) -> Option<WindowRows> {
+    rows_of_interval(situation, motion, trajectory, layout, layout.interval_s(window))
+}
+
 /// Information matrix of the calibration (n × n, in column units) from consecutive windows: each starts with what those
 /// before it have measured of the motion of the IMU.
 pub(super) fn joined<'a>(windows: impl IntoIterator<Item = &'a WindowRows>, columns: usize) -> DMatrix<f64> {
