@@ -8,6 +8,8 @@ use clap::Args;
 use dcvins::export;
 use dcvins::session::FlightPrior;
 
+use crate::cli::value_parsers::within;
+
 /// Calibration of earlier flights and the growth of its standard deviations.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct PriorArguments {
@@ -22,8 +24,7 @@ pub(crate) struct PriorArguments {
 }
 
 fn growth(text: &str) -> Result<f64, String> {
-    let factor: f64 = text.parse().map_err(|problem| format!("{problem}: '{text}'"))?;
-    if (1.0..=1e3).contains(&factor) { Ok(factor) } else { Err("expected a factor from 1 to 1000".to_owned()) }
+    within(text, 1.0..=1000.0, "a factor")
 }
 
 impl PriorArguments {

@@ -155,6 +155,13 @@ fn size(text: &str) -> Result<[usize; 2], String> {
 /// Maximum number of screenshots of one command; more are probably due to a mistyped period.
 const MAX_SCREENSHOTS: usize = 100_000;
 
+impl ScreenshotArguments {
+    /// True if the picture has a size on paper.
+    fn is_of_paper(&self, format: FormatArgument) -> bool {
+        self.figure.has_paper_size() || format == FormatArgument::Pdf
+    }
+}
+
 pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<ExitOutcome> {
     if is_study(&arguments.log) {
         return of_study(arguments);
@@ -168,7 +175,7 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<ExitOutcome>
     }
     let format = format_of(arguments)?;
     let shows_motion = ["all", PanelName::Laboratory.name()].contains(&arguments.panel.as_str());
-    let is_of_paper = arguments.figure.has_paper_size() || format == FormatArgument::Pdf;
+    let is_of_paper = arguments.is_of_paper(format);
     if arguments.motion.is_some() && (!shows_motion || is_of_paper) {
         bail!("--motion is shown by the laboratory as PNG or SVG: give --panel laboratory, without a size on paper");
     }
@@ -441,8 +448,7 @@ impl Shown {
         // The output path does not affect the images; figures have the command in their metadata.
         let options =
             ScreenshotArguments { output: PathBuf::new(), format: Some(format), force: false, ..arguments.clone() };
-        let is_figure = arguments.figure.has_paper_size() || format == FormatArgument::Pdf;
-        let command = if is_figure { own_command_line() } else { String::new() };
+        let command = if arguments.is_of_paper(format) { own_command_line() } else { String::new() };
         let motion = &self.motion;
         arguments.cache.result_of(
             &format!("{options:?}{motion:?}{command}"),

@@ -14,8 +14,8 @@ use crate::session::CalibrationRun;
 
 pub(super) const TRAJECTORY_FILES: [&str; 2] = ["trajectory.tum", "covariance.csv"];
 
-/// Writes `rig.yaml`, `calibration.json`, `posterior.json` and `report.txt` into a folder, and on request the trajectory with its
-/// covariances.
+/// Writes `rig.yaml`, `calibration.json`, `posterior.json` and `report.txt` into a folder, and on request the trajectory
+/// with its covariances.
 ///
 /// # Errors
 /// If a file or the folder cannot be written.

@@ -5,13 +5,13 @@ use std::fmt;
 use nalgebra::Matrix4;
 use serde::Serialize;
 
-use super::posterior::{FlightEntry, SigmaTable};
+use super::posterior::SigmaTable;
 use crate::calibration::{CalibrationOutcome, ExtrinsicsReport, PixelReport, PoseLoopReport, Statistics};
 use crate::flight_log::log_name;
 use crate::geometry::{Dimension, RigidTransform, seconds_from_ns, so3};
 use crate::gimbal::{Chain, Quantity};
 use crate::sensors::Rig;
-use crate::session::{CalibrationErrors, CalibrationRun, WarningLine, log_warning_lines};
+use crate::session::{CalibrationErrors, CalibrationRun, FlightSigmas, WarningLine, log_warning_lines};
 use crate::text::Named as _;
 
 /// One parameter before and after the calibration.
@@ -81,7 +81,7 @@ pub struct CalibrationReport {
     #[serde(rename = "truth")]
     pub ground_truth: Option<CalibrationErrors>,
     /// Standard deviations of all parameters under the rig's prior and after each flight.
-    pub flights: Vec<FlightEntry>,
+    pub flights: Vec<FlightSigmas>,
     /// The same as a table, `None` if the calibration did not start from other flights.
     #[serde(skip)]
     flight_table: Option<SigmaTable>,
@@ -114,7 +114,7 @@ pub fn report_calibration(run: &CalibrationRun) -> CalibrationReport {
             verdict: rank.verdict(&run.given_rig.parameter_names()),
         }),
         ground_truth: run.errors(),
-        flights: flights.entries(),
+        flights: flights.flights().to_vec(),
         flight_table: run.prior.is_some().then_some(flights),
         warnings,
     }
@@ -244,13 +244,7 @@ impl fmt::Display for CalibrationReport {
         }
         writeln!(f, "\nParameters                        initial       final     ± σ")?;
         for parameter in &self.parameters {
-            let (factor, unit) = match parameter.dimension {
-                Dimension::Angle => (180.0 / std::f64::consts::PI, "°"),
-                Dimension::Length => (1e3, "mm"),
-                Dimension::Time => (1e3, "ms"),
-                Dimension::Pixel => (1.0, "px"),
-                Dimension::Ratio => (1.0, ""),
-            };
+            let (factor, unit) = parameter.dimension.shown_unit();
             write!(
                 f,
                 "  {:<26} {:>12.4} {:>11.4} ± {:<9.4} {unit}",

@@ -9,7 +9,7 @@ use super::error::ExportError;
 use super::folder_files::write_files;
 use super::masks;
 use crate::flight_log::{FlightLog, LogWriterOptions, log_name, output, write_excerpt};
-use crate::geometry::seconds_from_ns;
+use crate::geometry::{ns_from_seconds, seconds_from_ns};
 use crate::observability::{UsefulStretch, UsefulStretches};
 use crate::sensors::Rig;
 use crate::session::{CollectedInformation, FlightSigmas};
@@ -137,7 +137,7 @@ pub fn write_stretches(
     write_files(masks, folder)?;
     for stretch in &mut summary.stretches {
         let path = folder.join(&stretch.log);
-        let span = [stretch.start_s, stretch.end_s].map(crate::geometry::ns_from_seconds);
+        let span = [stretch.start_s, stretch.end_s].map(ns_from_seconds);
         let report = write_excerpt(log, span.into(), &path, &LogWriterOptions::default())?;
         stretch.messages = report.messages;
         let mut rigs = vec![(stretch.log.with_extension("rig.yaml"), rig.to_yaml())];

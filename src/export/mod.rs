@@ -53,7 +53,7 @@ pub use masks::write_masks;
 pub use motion_csv::{read_motion, write_motion};
 pub use noise_files::{write_allan, write_flight_noise};
 pub use plan_files::{PlanReport, PlannedFlight, check_plan_folder, write_plan};
-pub use posterior::{FlightEntry, SigmaTable, prior_of_calibration, prior_of_run, read_prior};
+pub use posterior::{SigmaTable, prior_of_calibration, prior_of_run, read_prior};
 pub use result_cache::{CachedFile, ResultCache, ResultKey, ResultKeyBuilder};
 pub use run_files::{RunFileOptions, write_run};
 #[cfg(feature = "gui")]

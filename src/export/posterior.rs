@@ -1,6 +1,5 @@
 //! `posterior.json`: values and covariance of a calibration, from which another flight starts (`--prior`).
 
-use std::collections::BTreeMap;
 use std::fmt::{self, Display, Formatter};
 use std::fs;
 use std::path::Path;
@@ -35,7 +34,7 @@ struct PosteriorFile {
     /// By rows, over the columns of all cameras.
     covariance: Vec<Vec<f64>>,
     /// Standard deviations under the rig's prior, then after each flight.
-    flights: Vec<FlightEntry>,
+    flights: Vec<FlightSigmas>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -53,19 +52,6 @@ struct ColumnEntry {
     value: f64,
     /// Under the prior of the rig.
     rig_sigma: f64,
-}
-
-/// Standard deviations after a flight, by the name of the parameter.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct FlightEntry {
-    pub source: String,
-    pub sigmas: BTreeMap<String, f64>,
-}
-
-impl From<&FlightSigmas> for FlightEntry {
-    fn from(flight: &FlightSigmas) -> Self {
-        Self { source: flight.source.clone(), sigmas: flight.sigmas.clone() }
-    }
 }
 
 /// A posterior with the names of its cameras and the flights that it comes from.
@@ -155,7 +141,7 @@ impl<'a> NamedPosterior<'a> {
             joints: self.rig.joint_names(),
             cameras: cameras.collect(),
             covariance: self.posterior.covariance.row_iter().map(|row| row.iter().copied().collect()).collect(),
-            flights: self.flights().iter().map(FlightEntry::from).collect(),
+            flights: self.flights(),
         };
         format!("{}\n", serde_json::to_string(&file).unwrap_or_default())
     }
@@ -196,9 +182,9 @@ impl SigmaTable {
         Self { parameters: named.names().into_iter().zip(dimensions).collect(), flights: named.flights() }
     }
 
-    /// Entries of the flights for JSON.
-    pub fn entries(&self) -> Vec<FlightEntry> {
-        self.flights.iter().map(FlightEntry::from).collect()
+    /// Standard deviations under the rig's prior, after each earlier flight and after this one.
+    pub fn flights(&self) -> &[FlightSigmas] {
+        &self.flights
     }
 }
 
@@ -214,13 +200,7 @@ impl Display for SigmaTable {
         }
         writeln!(f)?;
         for (name, dimension) in &self.parameters {
-            let (factor, unit) = match dimension {
-                Dimension::Angle => (1f64.to_degrees(), "°"),
-                Dimension::Length => (1e3, "mm"),
-                Dimension::Time => (1e3, "ms"),
-                Dimension::Pixel => (1.0, "px"),
-                Dimension::Ratio => (1.0, ""),
-            };
+            let (factor, unit) = dimension.shown_unit();
             write!(f, "  {name:<26}")?;
             for flight in &self.flights {
                 match flight.sigmas.get(name) {
@@ -266,14 +246,13 @@ pub fn read_prior(folder: &Path, growth: f64) -> Result<FlightPrior, ExportError
     }
     let rig = Rig::from_file(&folder.join(RIG))?;
     let posterior = posterior_of(&file, &rig).map_err(refused)?;
-    let flights = file.flights.into_iter();
     Ok(FlightPrior {
         folder: folder.to_owned(),
         cameras: file.cameras.into_iter().map(|camera| camera.key).collect(),
         joints: file.joints,
         posterior,
         growth,
-        history: flights.map(|flight| FlightSigmas { source: flight.source, sigmas: flight.sigmas }).collect(),
+        history: file.flights,
     })
 }
 

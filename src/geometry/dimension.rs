@@ -32,6 +32,17 @@ impl Dimension {
         }
     }
 
+    /// Shown units per stored unit, and the symbol of the shown unit: degrees, millimetres, milliseconds.
+    pub const fn shown_unit(self) -> (f64, &'static str) {
+        match self {
+            Self::Angle => (180.0 / std::f64::consts::PI, "°"),
+            Self::Length => (1e3, "mm"),
+            Self::Time => (1e3, "ms"),
+            Self::Pixel => (1.0, "px"),
+            Self::Ratio => (1.0, ""),
+        }
+    }
+
     /// Difference of two values in the unit; of angles, in (−π, π].
     pub fn difference(self, value: f64, reference: f64) -> f64 {
         match self {

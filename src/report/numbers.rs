@@ -4,7 +4,6 @@ use crate::geometry::Dimension;
 
 /// Milliseconds per second.
 pub(super) const MS_PER_S: f64 = 1e3;
-const MM_PER_M: f64 = 1e3;
 
 /// A number with this number of decimals and a true minus sign; a negative zero is 0.
 pub(super) fn number(value: f64, decimals: usize) -> String {
@@ -18,13 +17,13 @@ pub(super) fn number(value: f64, decimals: usize) -> String {
 
 /// Shown unit of a dimension, number of shown units per stored unit, and decimals in tables.
 pub(super) fn shown_unit(dimension: Dimension) -> (&'static str, f64, usize) {
-    match dimension {
-        Dimension::Angle => ("°", 1f64.to_degrees(), 3),
-        Dimension::Length => ("mm", MM_PER_M, 2),
-        Dimension::Time => ("ms", MS_PER_S, 3),
-        Dimension::Pixel => ("px", 1.0, 3),
-        Dimension::Ratio => ("", 1.0, 6),
-    }
+    let decimals = match dimension {
+        Dimension::Length => 2,
+        Dimension::Angle | Dimension::Time | Dimension::Pixel => 3,
+        Dimension::Ratio => 6,
+    };
+    let (factor, unit) = dimension.shown_unit();
+    (unit, factor, decimals)
 }
 
 #[cfg(test)]

@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use serde::{Deserialize, Serialize};
+
 use super::error::SessionError;
 use crate::calibration::ChainDistance;
 use crate::estimator::{CalibrationPosterior, CalibrationPrior, EstimatorConfig};
@@ -30,7 +32,7 @@ pub struct FlightPrior {
 }
 
 /// Standard deviations of calibration parameters by name after a flight, or of the rig's prior.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FlightSigmas {
     /// Log with the name of its run, or the rig.
     pub source: String,
