@@ -41,6 +41,9 @@ pub struct FlightRecipe {
     pub rate_hz: f64,
     /// True if the static camera is recorded as well.
     pub static_camera: bool,
+    /// Factor of the noise of an IMU that moves with the gimbal camera, `None` without one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gimbal_imu_noise_scale: Option<f64>,
     /// Disturbances of every flight of this recipe, in the syntax of `dcvins simulate --disturb`.
     pub disturb: Vec<String>,
     /// Bound of the error of each translation of the given chain in metres, `None` for the experiment's.
@@ -112,6 +115,7 @@ impl FlightRecipe {
         options.resolution_px = self.size_px;
         options.camera_rate_hz = self.rate_hz;
         options.static_camera = self.static_camera;
+        options.gimbal_imu_noise_scale = self.gimbal_imu_noise_scale;
         for text in self.disturb.iter().chain(disturb) {
             options.disturbances.set(text)?;
         }

@@ -25,6 +25,7 @@ disturb = ["exposure=0.01"]
 start_error_m = 0.03
 start_error_deg = 10
 imu_noise_scale = 2
+gimbal_imu = 0.5
 lens = "radtan"
 
 [[flights]]
@@ -98,6 +99,7 @@ fn every_key_is_read() {
     let [town, t4] = plan.flights.as_slice() else { panic!("two flights") };
     assert_eq!((town.size_px, town.encoder, town.static_camera), ([320, 240], EncoderNoise::Degrees(0.5), false));
     assert!(town.mirrored && !t4.mirrored);
+    assert_eq!((town.gimbal_imu_noise_scale, t4.gimbal_imu_noise_scale), (Some(0.5), None));
     assert_eq!((t4.name.as_str(), t4.experiment.as_str(), t4.encoder), ("t4", "T4", EncoderNoise::None));
     assert_eq!(plan.disturbances[1].disturb, ["blank=11,1"]);
     let errors = &plan.perturbations[1];
@@ -238,5 +240,6 @@ fn plans_of_the_documents_and_benches_are_read() {
     check("uneven", include_str!("../../../benches/paper_tables/uneven.toml"));
     check("uneven_short", include_str!("../../../benches/paper_tables/uneven_short.toml"));
     check("losing_sight", include_str!("../../../benches/paper_tables/losing_sight.toml"));
+    check("gimbal_imu", include_str!("../../../benches/paper_tables/gimbal_imu.toml"));
     check("regression", include_str!("../../../benches/regression/plan.toml"));
 }
