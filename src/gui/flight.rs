@@ -106,7 +106,7 @@ impl FlightTable {
                 history.push(step, &self.verdicts);
             }
         }
-        let ended = run.finished || run.error.is_some();
+        let ended = run.has_ended();
         let improvable = self.verdicts.verdicts().any(|(_, verdict)| verdict.is_improvable());
         let step = self.verdicts.ranked_step().filter(|_| ended && improvable);
         if let Some(step) = step {

@@ -46,7 +46,7 @@ use self::opening::Opening;
 use self::opening_cursor::OpeningCursor;
 use self::playing_log::Images;
 pub use self::playing_log::PlayingLog;
-use self::repaint::{POLL_PERIOD, until_next_step};
+use self::repaint::{POLL_PERIOD, until_next_poll, until_next_step};
 use self::rig_question::RigPage;
 use self::shown_study::ShownStudy;
 pub use self::shown_study::{OpenStudy, StudySource};
@@ -79,6 +79,8 @@ pub struct App {
     wakes: bool,
     /// Wall-clock time of the window's last frame in seconds, if playback ran then.
     played_s: Option<f64>,
+    /// Seconds that the last frame took, layout and painting.
+    frame_s: Option<f32>,
     opening: Option<Opening>,
     /// Dropped files that wait for the answer whether they replace what is open.
     replacement: Option<OpenRequest>,
@@ -127,6 +129,7 @@ impl App {
             opening_cursor: OpeningCursor::default(),
             wakes: false,
             played_s: None,
+            frame_s: None,
             opening: None,
             replacement: None,
             rig_page: None,
@@ -295,7 +298,7 @@ impl App {
         }
         let playback = log.playback();
         self.played_s = playback.playing.then_some(now_s);
-        let computing = recording.runs.iter().any(|run| !run.finished && run.error.is_none());
+        let computing = recording.is_computing();
         if commanded {
             ui.ctx().request_repaint();
         } else if playback.playing {
@@ -303,9 +306,10 @@ impl App {
             let frame = Duration::from_secs_f32(ui.input(|input| input.predicted_dt.clamp(0.0, 1.0)));
             let wait = until_next_step(&recording, log.cursor_ns(), playback.speed);
             ui.ctx().request_repaint_after(wait + frame);
-        } else if computing || playback.recomputing || playback.running_to_breakpoint || log.generation() != generation
-        {
+        } else if playback.recomputing || playback.running_to_breakpoint {
             ui.ctx().request_repaint_after(POLL_PERIOD);
+        } else if computing || log.generation() != generation {
+            ui.ctx().request_repaint_after(until_next_poll(self.frame_s));
         }
         self.report_warnings(&recording);
     }
@@ -420,6 +424,7 @@ impl App {
 
 impl eframe::App for App {
     fn ui(&mut self, ui: &mut Ui, frame: &mut eframe::Frame) {
+        self.frame_s = frame.info().cpu_usage;
         Self::ui(self, ui);
         if let Some(window) = frame.winit_window() {
             self.place_window(ui, window);

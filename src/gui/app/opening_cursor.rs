@@ -32,7 +32,7 @@ impl OpeningCursor {
             return;
         }
         let (recording, restores) = (log.recording(), log.restores_cursor());
-        let computes = recording.runs.iter().any(|run| !run.finished && run.error.is_none());
+        let computes = recording.is_computing();
         if let Self::Follows { cursor_ns, moved_s, restores: restored } = *self {
             let playback = log.playback();
             let moved = log.cursor_ns() != cursor_ns || playback.solver.is_some();

@@ -1,4 +1,4 @@
-//! Time of the next frame during playback.
+//! Time of the next frame during playback, and while runs compute.
 
 use std::time::Duration;
 
@@ -7,6 +7,13 @@ use crate::session::{Recording, RunRecord};
 
 /// Period at which the window checks for new steps.
 pub(super) const POLL_PERIOD: Duration = Duration::from_millis(60);
+
+/// Longest period of these checks while runs compute.
+const LONGEST_POLL_PERIOD: Duration = Duration::from_millis(400);
+
+/// Time between two frames while runs compute and nothing else asks for one, as a multiple of the time that drawing takes:
+/// the processors belong to the runs.
+const POLL_TO_FRAME: f32 = 9.0;
 
 /// Longest time in seconds between two frames of playback; between two steps only the cursor moves.
 const LONGEST_PAUSE_S: f64 = 0.05;
@@ -20,6 +27,12 @@ pub(super) fn until_next_step(recording: &Recording, cursor_ns: i64, speed: f64)
     let wait_ns = recording.runs.iter().filter_map(next).min();
     let wait_s = wait_ns.map_or(LONGEST_PAUSE_S, |wait_ns| seconds_from_ns(wait_ns) / speed.max(f64::MIN_POSITIVE));
     Duration::from_secs_f64(wait_s.clamp(0.0, LONGEST_PAUSE_S))
+}
+
+/// Time until the window looks for steps of runs that compute, after a frame that took `frame_s` seconds.
+pub(super) fn until_next_poll(frame_s: Option<f32>) -> Duration {
+    let wait_s = POLL_TO_FRAME * frame_s.unwrap_or_default();
+    Duration::from_secs_f32(wait_s.clamp(POLL_PERIOD.as_secs_f32(), LONGEST_POLL_PERIOD.as_secs_f32()))
 }
 
 #[cfg(test)]
@@ -40,5 +53,11 @@ mod tests {
         assert_eq!(until_next_step(recording, stamp_ns, 0.1), longest);
         assert_eq!(until_next_step(recording, recording.last_stamp_ns(), 1.0), longest);
         assert_eq!(until_next_step(recording, stamp_ns, 0.0), longest);
+    }
+
+    #[test]
+    fn slow_frames_leave_the_processors_to_the_runs() {
+        let ms = |frame_s| until_next_poll(frame_s).as_millis();
+        assert_eq!([ms(None), ms(Some(0.002)), ms(Some(0.03)), ms(Some(0.5))], [60, 60, 270, 400]);
     }
 }

@@ -1,6 +1,7 @@
 //! Duration of the least observable direction, and the suggested excitation.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use egui::{RichText, Ui};
 
@@ -11,7 +12,7 @@ use crate::gui::PanelContext;
 use crate::gui::step_work::{REPAINT, StepWork};
 use crate::gui::theme::ROW_HEIGHT;
 use crate::observability::laboratory::{Advice, Situation, advise};
-use crate::session::{LostSince, RunRecord, StepRecord};
+use crate::session::{LostSince, Recording, RunRecord, StepRecord};
 
 /// Number of alternatives to the best motion.
 const OTHERS_SHOWN: usize = 3;
@@ -19,10 +20,24 @@ const OTHERS_SHOWN: usize = 3;
 /// Text shown if no motion helps.
 const NO_MOTION: &str = "No candidate motion constrains this calibration further";
 
-/// Seconds without cursor movement before advice is computed in the background.
-const CURSOR_IDLE_S: f64 = 0.15;
-/// Minimum period in seconds of the computation while the cursor moves.
-const MIN_PERIOD_S: f64 = 1.0;
+/// When advice is computed in the background.
+#[derive(Clone, Copy, Debug)]
+struct Pace {
+    /// Seconds without cursor movement after which it is computed.
+    cursor_idle_s: f64,
+    /// Minimum period in seconds of the computation while the cursor moves.
+    min_period_s: f64,
+}
+
+impl Pace {
+    const STANDARD: Self = Self { cursor_idle_s: 0.15, min_period_s: 1.0 };
+    /// While runs compute, which need the processors: a cursor that follows them moves four times a second.
+    const BESIDE_RUNS: Self = Self { cursor_idle_s: 0.8, min_period_s: 5.0 };
+
+    fn of(recording: &Recording) -> Self {
+        if recording.is_computing() { Self::BESIDE_RUNS } else { Self::STANDARD }
+    }
+}
 
 #[derive(Debug)]
 struct StepAdvice {
@@ -64,12 +79,15 @@ impl AdviceUi {
         }
         self.results.receive();
         if !self.results.has_result(step) {
-            if !in_background || self.is_due(now_s) {
+            let wait_s = self.due_after_s(Pace::of(ctx.recording), now_s);
+            if !in_background || wait_s <= 0.0 && !self.results.is_busy() {
                 self.requested_s = now_s;
                 self.request(ctx, run, step, in_background);
             }
-            if !self.results.has_result(step) {
+            if self.results.is_busy() {
                 ui.ctx().request_repaint_after(REPAINT);
+            } else if !self.results.has_result(step) {
+                ui.ctx().request_repaint_after(Duration::from_secs_f64(wait_s.max(0.0)).max(REPAINT));
             }
         }
     }
@@ -121,11 +139,12 @@ impl AdviceUi {
         Some(sentence.unwrap_or_else(|| NO_MOTION.to_owned()))
     }
 
-    /// True if a computation in the background is due.
-    fn is_due(&self, now_s: f64) -> bool {
-        let rests = self.seen.as_ref().is_some_and(|(_, since_s)| now_s - since_s >= CURSOR_IDLE_S);
-        let first = self.results.last().is_none();
-        !self.results.is_busy() && (first || rests || now_s - self.requested_s >= MIN_PERIOD_S)
+    /// Seconds until a computation in the background is due, not positive if it is.
+    fn due_after_s(&self, pace: Pace, now_s: f64) -> f64 {
+        let Some((_, since_s)) = self.seen.as_ref().filter(|_| self.results.last().is_some()) else { return 0.0 };
+        let at_rest_s = since_s + pace.cursor_idle_s - now_s;
+        let moving_s = self.requested_s + pace.min_period_s - now_s;
+        at_rest_s.min(moving_s)
     }
 
     fn request(&mut self, ctx: &PanelContext<'_>, run: &RunRecord, step: &Arc<StepRecord>, in_background: bool) {

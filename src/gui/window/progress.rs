@@ -25,7 +25,7 @@ pub struct Progress {
 impl ProgressMeter {
     /// Reads a recording at a time of the wall clock; `None` when all steps are computed.
     pub fn read(&mut self, recording: &Recording, now_s: Option<f64>) -> Option<Progress> {
-        let open = recording.runs.iter().filter(|run| !run.finished && run.error.is_none());
+        let open = recording.runs.iter().filter(|run| !run.has_ended());
         let fractions: Vec<f64> = open.map(|run| run.computed_fraction(recording.duration_ns)).collect();
         if fractions.is_empty() {
             *self = Self::default();

@@ -53,6 +53,11 @@ impl Recording {
         parameters
     }
 
+    /// True while a run has further steps to come.
+    pub fn is_computing(&self) -> bool {
+        self.runs.iter().any(|run| !run.has_ended())
+    }
+
     pub fn log_name(&self) -> String {
         self.log_path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
     }

@@ -125,6 +125,11 @@ impl RunRecord {
         }
     }
 
+    /// True if no step follows: all are computed, or the run ended with an error.
+    pub fn has_ended(&self) -> bool {
+        self.finished || self.error.is_some()
+    }
+
     /// Sets antenna positions as the ground truth; the run must not have steps yet.
     #[must_use]
     pub fn with_position_truth(mut self, truth: Option<Arc<PositionTruth>>) -> Self {

@@ -45,7 +45,7 @@ impl Story {
 /// Stamp of the step shortly after the informed rank has fallen from its maximum, within the first seconds of tracking;
 /// of the last step of a run without a rank. `None` while too few steps are computed.
 fn instant_ns(run: &RunRecord) -> Option<i64> {
-    let over = run.finished || run.error.is_some();
+    let over = run.has_ended();
     let last_ns = run.steps.last()?.report.stamp_ns;
     let informed = |step: &StepRecord| {
         step.rank.as_ref().filter(|rank| !rank.parameters.is_empty()).map(|rank| rank.rank_informed)
