@@ -26,7 +26,7 @@ pub(crate) struct DiagnoseArguments {
 pub(crate) fn diagnose(arguments: &DiagnoseArguments) -> Result<ExitOutcome> {
     let (log, estimation) = prepared_log(std::slice::from_ref(&arguments.log), &arguments.estimation)?;
     let arguments = &DiagnoseArguments { log, estimation, ..arguments.clone() };
-    let plan = SessionPlan::open(&arguments.estimation.request(arguments.log.clone()))?;
+    let plan = SessionPlan::open(&arguments.estimation.request(arguments.log.clone())?)?;
     let interrupt = Interrupt::watch()?;
     let plan = SessionPlan { interrupted: interrupt.flag(), ..plan };
     let computation = compute(&plan, None)?;

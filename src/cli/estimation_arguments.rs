@@ -2,12 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
+use anyhow::Result;
 use clap::Args;
 use dcvins::sensors::LeverArm;
 use dcvins::session::{ParameterizationChoice, RunSpec, SessionRequest, TrajectorySource, TrajectorySpec};
 use dcvins::text::{Named as _, key_list};
 
 use crate::cli::limit_arguments::LimitArguments;
+use crate::cli::prior_arguments::PriorArguments;
 use crate::cli::value_parsers::seconds;
 
 /// Runs, rig, ground truth and time range, shared by the sub-commands that run the estimator.
@@ -39,6 +41,8 @@ pub(crate) struct EstimationArguments {
     /// Duration to process from there.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub duration: Option<f64>,
+    #[command(flatten)]
+    pub prior: PriorArguments,
     #[command(flatten)]
     pub limits: LimitArguments,
 }
@@ -73,20 +77,23 @@ impl EstimationArguments {
     }
 
     /// The session request with these arguments.
-    pub(crate) fn request(&self, log_path: PathBuf) -> SessionRequest {
-        SessionRequest {
+    ///
+    /// # Errors
+    /// If the calibration of earlier flights cannot be read.
+    pub(crate) fn request(&self, log_path: PathBuf) -> Result<SessionRequest> {
+        Ok(SessionRequest {
             log_path,
             recording: Vec::new(),
             rig_path: self.rig.clone(),
             ground_truth_path: self.ground_truth.clone(),
             specs: self.runs.clone(),
-            prior: None,
+            prior: self.prior.read()?,
             trajectories: self.trajectories.clone(),
             truth_trajectory: self.truth_trajectory.clone(),
             lever_arm: self.lever_arm,
             start_s: self.start,
             duration_s: self.duration,
             limits: self.limits.limits(),
-        }
+        })
     }
 }

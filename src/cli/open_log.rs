@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use dcvins::export::{
-    ConvertedLogs, LogSources, PreparedLog, SourceError, is_session, prepare_log, prepare_session, read_session,
+    ConvertedLogs, LogSources, PreparedLog, SourceError, is_session, open_session, prepare_log, prepare_session,
+    read_session,
 };
 use dcvins::flight_log::convert::SourceKind;
 use dcvins::flight_log::{FlightLog, LogError, LogLimits, log_name, missing_sensors, rig_candidates};
@@ -38,7 +39,7 @@ pub(crate) fn open_log(
                 progress(OpenProgress { text: stage_text(stage, of), ratio })
             });
         let saved = saved.map_err(|error| failure(&error))?;
-        let session = saved.open().map_err(|error| problem(format!("{error}: {}", sources.main.display())))?;
+        let session = open_session(&saved).map_err(|error| problem(error.to_string()))?;
         return Ok(OpenedLog { log: Box::new(session), remembered: sources.main, notices: Vec::new() });
     }
     let sources = LogSources { rig: request.rig.clone().or(sources.rig), ..sources };
@@ -54,7 +55,7 @@ pub(crate) fn open_log(
         recording: of_recording.clone(),
         rig_path: prepared.rig.clone().or_else(|| estimation.rig.clone()).or(beside),
         ground_truth_path: prepared.ground_truth.clone().or_else(|| estimation.ground_truth.clone()),
-        ..estimation.request(prepared.log.clone())
+        ..estimation.request(prepared.log.clone()).map_err(|error| OpenFailure::Problem(error.to_string()))?
     };
     if session_request.rig_path.is_none() && sources.kind == Some(SourceKind::Video) {
         // The conversion of a video writes a rig whose values are assumed; they are shown before they are used.

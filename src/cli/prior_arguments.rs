@@ -11,7 +11,7 @@ use dcvins::session::FlightPrior;
 use crate::cli::value_parsers::within;
 
 /// Calibration of earlier flights and the growth of its standard deviations.
-#[derive(Args, Clone, Debug)]
+#[derive(Args, Clone, Debug, Default)]
 pub(crate) struct PriorArguments {
     /// Start from the calibration of earlier flights, values and covariance: the folder of a run (OUT/NAME of
     /// 'dcvins run') or of 'dcvins calibrate'.

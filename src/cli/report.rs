@@ -62,7 +62,7 @@ pub(crate) fn report(arguments: &ReportArguments) -> Result<ExitOutcome> {
     arguments.study.require_none(&arguments.log)?;
     let (log, estimation) = prepared_log(std::slice::from_ref(&arguments.log), &arguments.estimation)?;
     let arguments = &ReportArguments { log, estimation, ..arguments.clone() };
-    let plan = SessionPlan::open(&arguments.estimation.request(arguments.log.clone()))?;
+    let plan = SessionPlan::open(&arguments.estimation.request(arguments.log.clone())?)?;
     let labels: Vec<&str> = plan.runs.iter().map(|(spec, _)| spec.label.as_str()).collect();
     export::check_report_folder(&arguments.output, &labels, &arguments.log, arguments.force)?;
     let interrupt = Interrupt::watch()?;

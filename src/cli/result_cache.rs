@@ -60,6 +60,8 @@ fn key(options: &str, log: &Path, estimation: &EstimationArguments, plan: &Sessi
     key.add_text(options);
     // The parsed rigs, whatever their source.
     key.add_text(&format!("{:?} {:?} {}", plan.rig, plan.ground_truth_rig, plan.truth_is_batch));
+    // The calibration of earlier flights, read from its folder.
+    key.add_text(&format!("{:?}", plan.prior));
     let mut files = estimation.input_files(log);
     if let Some(TrajectorySource::File(path)) = &estimation.truth_trajectory {
         files.push(path.clone());

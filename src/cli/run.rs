@@ -8,14 +8,13 @@ use dcvins::export::{self, RunFileOptions};
 use dcvins::flight_log::log_name;
 use dcvins::geometry::seconds_from_ns;
 use dcvins::session::breakpoints::Condition;
-use dcvins::session::{BreakpointHit, Recording, RunRecord, RunSummary, SessionPlan, SessionRequest};
+use dcvins::session::{BreakpointHit, Recording, RunRecord, RunSummary, SessionPlan};
 
 use crate::cli::compute::{compute, compute_until};
 use crate::cli::estimation_arguments::EstimationArguments;
 use crate::cli::exit::ExitOutcome;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::prepared_log::prepared_log;
-use crate::cli::prior_arguments::PriorArguments;
 use crate::cli::run_summary::{describe, describe_trajectory};
 use crate::cli::terminal::{notify, print, print_json};
 
@@ -28,8 +27,6 @@ pub(crate) struct RunArguments {
     pub out: PathBuf,
     #[command(flatten)]
     pub estimation: EstimationArguments,
-    #[command(flatten)]
-    pub prior: PriorArguments,
     /// Stop when this condition becomes true in a run, as in "rank < 18 or features < 40", write the files up to that
     /// step and print the values; docs/manual.md lists the quantities.
     #[arg(long = "break", value_name = "CONDITION", value_parser = condition)]
@@ -63,8 +60,7 @@ const SUMMARY_BUDGET_BYTES: usize = 16 << 20;
 pub(crate) fn run(arguments: &RunArguments) -> Result<ExitOutcome> {
     let (log, estimation) = prepared_log(std::slice::from_ref(&arguments.log), &arguments.estimation)?;
     let arguments = &RunArguments { log, estimation, ..arguments.clone() };
-    let prior = arguments.prior.read()?;
-    let plan = SessionPlan::open(&SessionRequest { prior, ..arguments.estimation.request(arguments.log.clone()) })?;
+    let plan = SessionPlan::open(&arguments.estimation.request(arguments.log.clone())?)?;
     let labels: Vec<&str> = plan.runs.iter().map(|(spec, _)| spec.label.as_str()).collect();
     export::check_run_folders(&arguments.out, &labels, &arguments.log, arguments.force)?;
     let interrupt = Interrupt::watch()?;

@@ -7,7 +7,7 @@ use anyhow::{Context as _, Result, bail};
 use clap::{Args, ValueEnum};
 use dcvins::export::{
     PANEL_NAMES, Renderer, STUDY_PANEL_NAMES, ScreenshotOptions, check_screenshot, draw_panel, draw_panel_svg,
-    figure_bytes, is_session, panel_csv, png_bytes, read_motion, write_screenshot,
+    figure_bytes, is_session, open_session, panel_csv, png_bytes, read_motion, write_screenshot,
 };
 use dcvins::flight_log::{ImageReader, log_name};
 use dcvins::geometry::{ns_from_seconds, seconds_from_ns};
@@ -417,11 +417,14 @@ impl Shown {
             if !arguments.estimation.runs.is_empty() {
                 bail!("a saved session contains its runs: leave --run out");
             }
+            if arguments.estimation.prior.prior.is_some() {
+                bail!("a saved session contains the prior of its runs: leave --prior out");
+            }
             let saved = prepared_session(&arguments.log, &arguments.estimation.limits.limits())?;
             let (start_s, duration_s) = (saved.start_s, saved.duration_s);
-            (Source::Saved(Box::new(saved.open()?)), start_s, duration_s)
+            (Source::Saved(Box::new(open_session(&saved)?)), start_s, duration_s)
         } else {
-            let plan = SessionPlan::open(&arguments.estimation.request(arguments.log.clone()))?;
+            let plan = SessionPlan::open(&arguments.estimation.request(arguments.log.clone())?)?;
             let images = ImageReader::new(Arc::clone(&plan.log), &plan.rig);
             let (start_s, duration_s) = (plan.start_s, plan.duration_s);
             (Source::Log(Box::new(plan), images), start_s, duration_s)

@@ -108,7 +108,7 @@ mod window {
     /// Reports an error of a log or of its rig; a log without a rig is none, since the window asks for one.
     fn check_log(sources: &LogSources, estimation: &EstimationArguments) -> Result<()> {
         let rig_path = sources.rig.clone().or_else(|| estimation.rig.clone());
-        let request = SessionRequest { rig_path, ..estimation.request(sources.main.clone()) };
+        let request = SessionRequest { rig_path, ..estimation.request(sources.main.clone())? };
         match SessionPlan::open(&request) {
             Err(SessionError::Log(LogError::NoRig { .. })) | Ok(_) => Ok(()),
             Err(error) => Err(error.into()),
@@ -123,7 +123,7 @@ mod window {
             return Err(WindowError::NoDisplay.into());
         }
         let (log, estimation) = prepared_log(&arguments.sources, &arguments.estimation)?;
-        write_screenshots(&SessionPlan::open(&estimation.request(log))?, arguments.out.as_deref())
+        write_screenshots(&SessionPlan::open(&estimation.request(log)?)?, arguments.out.as_deref())
     }
 
     /// Writes a screenshot of every panel of a study.

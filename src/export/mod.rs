@@ -61,7 +61,7 @@ pub use screenshot::{
     PANEL_NAMES, Renderer, STUDY_PANEL_NAMES, ScreenshotError, ScreenshotOptions, draw_panel, draw_panel_svg,
     panel_csv, png_bytes, write_csv, write_png, write_screenshot, write_svg,
 };
-pub use session_file::{is_session, read_session};
+pub use session_file::{is_session, open_session, read_session};
 pub use sources::{ConversionStage, ConvertedLogs, LogSources, PreparedLog, SourceError, prepare_log, prepare_session};
 pub use stills_files::write_stills;
 pub use stills_report::StillsReport;

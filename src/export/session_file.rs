@@ -2,9 +2,11 @@
 
 use std::fs;
 use std::path::Path;
+use std::sync::Arc;
 
 use super::error::ExportError;
-use crate::session::SavedSession;
+use super::posterior::read_prior;
+use crate::session::{SavedSession, Session};
 
 /// True for the path of a saved session, `*.session.json`.
 pub fn is_session(path: &Path) -> bool {
@@ -19,4 +21,16 @@ pub fn read_session(path: &Path) -> Result<SavedSession, ExportError> {
     let text = fs::read_to_string(path).map_err(|source| ExportError::Read { source, path: path.to_owned() })?;
     SavedSession::from_text(&text)
         .map_err(|problem| ExportError::Session { problem: Box::new(problem), path: path.to_owned() })
+}
+
+/// Opens the log of a saved session, with the calibration of earlier flights that its runs start from, and starts the
+/// runs.
+///
+/// # Errors
+/// If the log or that calibration cannot be opened, or an entry of the session is invalid.
+pub fn open_session(saved: &SavedSession) -> Result<Session, ExportError> {
+    let prior = saved.prior.as_ref().map(|prior| read_prior(&prior.folder, prior.growth)).transpose()?;
+    saved
+        .open(prior.map(Arc::new))
+        .map_err(|problem| ExportError::Session { problem: Box::new(problem), path: saved.log.path.clone() })
 }

@@ -43,7 +43,7 @@ pub use plan::{
 };
 pub use playback::{
     Command, Cursor, DiagnosisProgress, FrameImage, Marker, Markers, MoveOutcome, Moved, PlaybackSpeed,
-    SavedBreakpoint, SavedFork, SavedLog, SavedSession, SavedSessionError, Session, Wake,
+    SavedBreakpoint, SavedFork, SavedLog, SavedPrior, SavedSession, SavedSessionError, Session, Wake,
 };
 pub use record::{
     CollectedInformation, ComparedQuantity, Comparison, Divergence, FlightParameter, FlightVerdicts, ForkOrigin,

@@ -55,6 +55,11 @@ fn a_run_starts_from_the_posterior_of_another_one() {
     let text = |name: &str| fs::read(at.join(name)).expect("the file is there");
     assert!(text("b/minimal/posterior.json") == text("c/minimal/posterior.json"), "the files differ");
 
+    // Other commands start from it, too.
+    let shot = ["screenshot", &garden, "--run", "minimal", "--start", "4", "--panel", "convergence", "--prior"];
+    dcvins(at, &[&shot[..], &["a/minimal", "-o", "shot.png"]].concat(), 0, &[]);
+    dcvins(at, &[&shot[..], &["none", "-o", "none.png"]].concat(), 1, &["OUT/NAME", "posterior.json"]);
+
     // A rig that was edited later is another mechanism than that of the covariance.
     let rig = fs::read_to_string(a.join("rig.yaml")).expect("the rig");
     let edited = rig.replacen("\n    d: 0.", "\n    d: 0.1", 1);

@@ -12,7 +12,7 @@ mod tests;
 
 use std::collections::BTreeMap;
 
-use egui::{Rect, RichText, ScrollArea, Ui, vec2};
+use egui::{Label, Rect, RichText, ScrollArea, Ui, vec2};
 
 use self::groups::{ConvergenceView, groups_of};
 use self::model::{CalibrationHistory, ConvertedHistory};
@@ -76,6 +76,9 @@ impl Panel for ConvergencePanel {
             let (rows, below) = available.split_top_bottom_at_y(available.top() + height);
             ui.advance_cursor_after_rect(rows);
             available = below.with_min_y(ui.cursor().top());
+        }
+        if !ctx.presentation.is_figure() && prior_ui(ui, ctx) {
+            available = available.with_min_y(ui.cursor().top());
         }
         let groups = groups_of(&parameters);
         if groups.len() > 1 && !ctx.presentation.is_figure() {
@@ -176,6 +179,21 @@ impl ConvergencePanel {
             }
         }
     }
+}
+
+/// Names the earlier flights from whose calibration the runs start; false without any.
+fn prior_ui(ui: &mut Ui, ctx: &PanelContext<'_>) -> bool {
+    let Some(prior) = ctx.recording.prior.as_deref() else { return false };
+    // The first entry is the prior of the rig.
+    let flights: Vec<&str> = prior.history.iter().skip(1).map(|flight| flight.source.as_str()).collect();
+    let growth = if prior.growth == 1.0 { String::new() } else { format!(", σ × {}", prior.growth) };
+    let text = format!("Prior: calibration after {}{growth}", flights.join(", then "));
+    let label = Label::new(RichText::new(text).color(ctx.theme.text_weak)).truncate();
+    ui.add(label).on_hover_text(format!(
+        "All runs start from values and covariance of these flights instead of the rig's:\n{}",
+        prior.folder.display()
+    ));
+    true
 }
 
 /// Shows the reason why a panel has no content.

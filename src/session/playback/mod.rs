@@ -18,6 +18,6 @@ pub use background_images::FrameImage;
 pub use command::{Command, PlaybackSpeed};
 pub use cursor::{Cursor, MoveOutcome, Moved};
 pub use markers::{Marker, Markers};
-pub use saved::{SavedBreakpoint, SavedFork, SavedLog, SavedSession, SavedSessionError};
+pub use saved::{SavedBreakpoint, SavedFork, SavedLog, SavedPrior, SavedSession, SavedSessionError};
 pub use session::Session;
 pub use shared::Wake;

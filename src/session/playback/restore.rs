@@ -1,20 +1,22 @@
 //! Saving and restoring sessions.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use super::markers::Markers;
 use super::saved::{
-    PendingRestore, SavedBreakpoint, SavedFork, SavedLog, SavedSession, SavedSessionError, VERSION, entry_error,
+    PendingRestore, SavedBreakpoint, SavedFork, SavedLog, SavedPrior, SavedSession, SavedSessionError, VERSION,
+    entry_error,
 };
 use super::session::Session;
 use crate::session::breakpoints::Condition;
-use crate::session::plan::{ForkChanges, SessionPlan, TrajectorySource, TrajectorySpec};
+use crate::session::plan::{FlightPrior, ForkChanges, SessionPlan, TrajectorySource, TrajectorySpec};
 
 impl SavedSession {
-    /// Opens the log and starts the runs. Forks are started when their parents reach the fork's first step, and the
+    /// Opens the log and starts the runs; `prior` is the calibration at [`Self::prior`]. Forks are started when their parents reach the fork's first step, and the
     /// cursor is set to its position when all runs have reached it.
-    pub fn open(&self) -> Result<Session, SavedSessionError> {
-        let plan = SessionPlan::open(&self.request()?)?;
+    pub fn open(&self, prior: Option<Arc<FlightPrior>>) -> Result<Session, SavedSessionError> {
+        let plan = SessionPlan::open(&self.request(prior)?)?;
         let conditions: Result<Vec<Condition>, _> = self.breakpoints.iter().map(|it| it.condition.parse()).collect();
         let conditions = conditions.map_err(entry_error)?;
         let mut forks = Vec::new();
@@ -73,6 +75,11 @@ impl Session {
             start_s: self.plan.start_s,
             duration_s: self.plan.duration_s,
             runs: recording.runs.iter().filter(|run| run.origin.is_none()).map(|run| run.spec.to_string()).collect(),
+            prior: self
+                .plan
+                .prior
+                .as_ref()
+                .map(|prior| SavedPrior { folder: absolute(&prior.folder), growth: prior.growth }),
             trajectories: self.plan.trajectories.iter().map(|loaded| saved_spec(&loaded.spec)).collect(),
             forks: forks.chain(pending).collect(),
             breakpoints: breakpoints.collect(),
@@ -198,7 +205,7 @@ mod tests {
         let saved = session.saved(Some(layout.clone()));
         assert_eq!(SavedSession::from_text(&saved.to_text()).unwrap(), saved);
 
-        let mut again = SavedSession::from_text(&saved.to_text()).unwrap().open().unwrap();
+        let mut again = SavedSession::from_text(&saved.to_text()).unwrap().open(None).unwrap();
         settled(&mut again);
         assert!(again.take_notices().is_empty());
         assert_eq!(again.layout(), Some(&layout));
@@ -224,12 +231,12 @@ mod tests {
         assert!(refused("hello").contains("not a saved session"));
         assert!(refused("{}").contains("session_version"));
         assert!(refused("{\"session_version\": 9}").contains("version 9"));
-        let problem = |saved: SavedSession| saved.open().err().map(|error| error.to_string()).unwrap_or_default();
+        let problem = |saved: SavedSession| saved.open(None).err().map(|error| error.to_string()).unwrap_or_default();
         assert!(problem(SavedSession { runs: vec!["minimol".to_owned()], ..saved.clone() }).contains("minimol"));
         let breakpoints = vec![SavedBreakpoint { condition: "rank <".to_owned(), enabled: true }];
         assert!(problem(SavedSession { breakpoints, ..saved.clone() }).contains("column 7"));
         let log = SavedLog { crc32: saved.log.crc32 ^ 1, ..saved.log.clone() };
-        let mut other = SavedSession { log, ..saved }.open().unwrap();
+        let mut other = SavedSession { log, ..saved }.open(None).unwrap();
         assert!(other.take_notices()[0].contains("differs"));
     }
 }

@@ -3,6 +3,7 @@
 //! Results are not stored; they are recomputed to the same bits.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -10,7 +11,9 @@ use thiserror::Error;
 use super::markers::Marker;
 use crate::flight_log::LogLimits;
 use crate::sensors::LeverArm;
-use crate::session::plan::{ForkChanges, RunSpec, SessionError, SessionRequest, TrajectorySource, TrajectorySpec};
+use crate::session::plan::{
+    FlightPrior, ForkChanges, RunSpec, SessionError, SessionRequest, TrajectorySource, TrajectorySpec,
+};
 
 /// Version of the file format that this program writes.
 pub(super) const VERSION: u32 = 2;
@@ -59,6 +62,9 @@ pub struct SavedSession {
     pub duration_s: Option<f64>,
     /// Specifications of the runs that are not forks, as on the command line.
     pub runs: Vec<String>,
+    /// Calibration of earlier flights that the runs start from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub prior: Option<SavedPrior>,
     /// Trajectories of other programs, as on the command line.
     #[serde(default)]
     pub trajectories: Vec<String>,
@@ -82,6 +88,14 @@ pub struct SavedLog {
     pub bytes: u64,
     /// CRC-32 of its first and last mebibyte.
     pub crc32: u32,
+}
+
+/// Calibration of earlier flights: its folder, and the factor on its standard deviations.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SavedPrior {
+    #[serde(with = "super::saved_path")]
+    pub folder: PathBuf,
+    pub growth: f64,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -120,8 +134,8 @@ impl SavedSession {
         text
     }
 
-    /// Request that opens the log and its runs.
-    pub fn request(&self) -> Result<SessionRequest, SavedSessionError> {
+    /// Request that opens the log and its runs; `prior` is the calibration at [`Self::prior`].
+    pub fn request(&self, prior: Option<Arc<FlightPrior>>) -> Result<SessionRequest, SavedSessionError> {
         let specs: Result<Vec<RunSpec>, _> = self.runs.iter().map(|run| run.parse()).collect();
         let trajectories: Result<Vec<TrajectorySpec>, _> = self.trajectories.iter().map(|text| text.parse()).collect();
         let truth = self.truth_trajectory.as_ref().map(|text| text.parse::<TrajectorySource>());
@@ -134,7 +148,7 @@ impl SavedSession {
             rig_path: self.rig.clone(),
             ground_truth_path: self.ground_truth.clone(),
             specs: specs.map_err(entry_error)?,
-            prior: None,
+            prior,
             trajectories: trajectories.map_err(entry_error)?,
             start_s: self.start_s,
             duration_s: self.duration_s,
@@ -176,6 +190,7 @@ mod tests {
             start_s: 0.0,
             duration_s: None,
             runs: Vec::new(),
+            prior: Some(SavedPrior { folder: path(b"/logs/\xfc/minimal"), growth: 2.0 }),
             trajectories: Vec::new(),
             forks: Vec::new(),
             breakpoints: Vec::new(),
@@ -190,8 +205,8 @@ mod tests {
             text.replace("\"session_version\": 2", "\"session_version\": 1").replace("\"markers\"", "\"markers_ns\"");
         let old = SavedSession::from_text(&old).unwrap();
         assert_eq!(old, SavedSession { session_version: 1, ..session.clone() });
-        let none = SavedSession { rig: None, recording: Vec::new(), ..session };
-        assert!(!none.to_text().contains("recording"));
+        let none = SavedSession { rig: None, recording: Vec::new(), prior: None, ..session };
+        assert!(!none.to_text().contains("recording") && !none.to_text().contains("prior"));
         assert_eq!(SavedSession::from_text(&none.to_text()).unwrap(), none);
     }
 }
