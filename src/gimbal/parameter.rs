@@ -266,6 +266,8 @@ impl Quantity {
     /// Columns of a rotation vector.
     pub const ROTATION: [Self; 3] = [Self::Rx, Self::Ry, Self::Rz];
     /// Columns of a rigid transform: rotation vector, then translation.
+    pub const TRANSLATION: [Self; 3] = [Self::Tx, Self::Ty, Self::Tz];
+
     pub const TRANSFORM: [Self; 6] = [Self::Rx, Self::Ry, Self::Rz, Self::Tx, Self::Ty, Self::Tz];
     /// Columns of a Denavit–Hartenberg link.
     pub const LINK: [Self; 4] = [Self::Theta, Self::D, Self::A, Self::Alpha];

@@ -240,14 +240,15 @@ impl Calibration {
         self.sensor_column(ParameterId::ENCODER_TIMESHIFT)
     }
 
-    /// Correction of the orientation of the IMU on the gimbal, as a rotation vector; zero without columns.
-    pub(crate) fn gimbal_imu_rotation(&self) -> Vector3<f64> {
+    /// Corrections of the orientation of the IMU on the gimbal, as a rotation vector, and of its position in the camera's
+    /// frame; zero without columns.
+    pub(crate) fn gimbal_imu_correction(&self) -> [Vector3<f64>; 2] {
         let value = |quantity| self.sensor_value(ParameterId { part: ParameterPart::GimbalImu, quantity });
-        Quantity::ROTATION.map(value).into()
+        [Quantity::ROTATION, Quantity::TRANSLATION].map(|quantities| quantities.map(value).into())
     }
 
-    /// First of the three columns of [`Self::gimbal_imu_rotation`], `None` if they are fixed.
-    pub(crate) fn gimbal_imu_rotation_column(&self) -> Option<usize> {
+    /// First of the six columns of [`Self::gimbal_imu_correction`], `None` if they are fixed.
+    pub(crate) fn gimbal_imu_pose_column(&self) -> Option<usize> {
         self.sensor_column(ParameterId { part: ParameterPart::GimbalImu, quantity: Quantity::Rx })
     }
 

@@ -73,11 +73,11 @@ impl CalibrationPosterior {
 
     /// Calibration of one camera with absolute values of the columns after the chain's.
     ///
-    /// The orientation of an IMU on the gimbal is left out: its columns are relative to the rig of their run.
+    /// The pose of an IMU on the gimbal is left out: its columns are relative to the rig of their run.
     fn found(&self, camera: usize) -> FoundCamera {
         let (columns, one) = (self.columns(camera), &self.cameras[camera]);
         let is_relative = |parameter: &ParameterId| {
-            parameter.part == ParameterPart::GimbalImu && Quantity::ROTATION.contains(&parameter.quantity)
+            parameter.part == ParameterPart::GimbalImu && Quantity::TRANSFORM.contains(&parameter.quantity)
         };
         let kept: Vec<usize> = (0..columns.len()).filter(|place| !is_relative(&one.parameters[*place])).collect();
         let block = self.covariance.view_range(columns.clone(), columns);

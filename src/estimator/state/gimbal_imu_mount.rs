@@ -12,27 +12,30 @@ use crate::sensors::ImuSample;
 /// Rig's pose of the IMU in the gimbal camera's frame, with estimated corrections.
 #[derive(Clone, Debug)]
 pub(crate) struct GimbalImuMount {
-    /// `camera_from_imu1` with the estimated rotation.
+    /// `camera_from_imu1` with the estimated corrections.
     pub(crate) camera_from_imu: RigidTransform,
     /// Rotation vector of the correction: `R = R_rig Exp(r)`.
     pub(crate) rotation_vector: Vector3<f64>,
     /// Time of the measurements minus their stamps, relative to the rig, in seconds.
     pub(crate) shift_s: f64,
-    /// First of the three columns of the correction among those of the camera, `None` if it is fixed.
-    pub(crate) rotation_column: Option<usize>,
+    /// First of the six columns of rotation and position among those of the camera, `None` if they are fixed.
+    pub(crate) pose_column: Option<usize>,
     /// Column of the time offset, `None` if it is fixed.
     pub(crate) shift_column: Option<usize>,
 }
 
 impl GimbalImuMount {
     pub(crate) fn new(given: &RigidTransform, calibration: &Calibration) -> Self {
-        let rotation_vector = calibration.gimbal_imu_rotation();
+        let [rotation_vector, offset_m] = calibration.gimbal_imu_correction();
         let free = calibration.dof() > 0;
         Self {
-            camera_from_imu: RigidTransform::new(given.rotation * so3::exp(&rotation_vector), given.translation_m),
+            camera_from_imu: RigidTransform::new(
+                given.rotation * so3::exp(&rotation_vector),
+                given.translation_m + offset_m,
+            ),
             rotation_vector,
             shift_s: calibration.gimbal_imu_shift_s(),
-            rotation_column: calibration.gimbal_imu_rotation_column().filter(|_| free),
+            pose_column: calibration.gimbal_imu_pose_column().filter(|_| free),
             shift_column: calibration.gimbal_imu_shift_column().filter(|_| free),
         }
     }
@@ -52,7 +55,7 @@ impl GimbalImuMount {
     /// camera's calibration (6 × columns).
     ///
     /// ```text
-    /// φ_2 = Rᵀ φ_c + J_r(r) δr    p_2 = p_c − R_wc [t]× φ_c
+    /// φ_2 = Rᵀ φ_c + J_r(r) δr    p_2 = p_c − R_wc [t]× φ_c + R_wc δt
     /// ```
     ///
     /// with `[φ_c, p_c]` of the camera and `(R, t) = camera_from_imu1`.
@@ -67,9 +70,10 @@ impl GimbalImuMount {
         let lever = world_from_camera * so3::hat(&self.camera_from_imu.translation_m);
         carried.fixed_view_mut::<3, 3>(3, 0).copy_from(&-lever);
         let mut by_calibration = &carried * by_calibration;
-        if let Some(column) = self.rotation_column {
+        if let Some(column) = self.pose_column {
             let by_rotation = so3::right_jacobian(&self.rotation_vector);
             by_calibration.view_mut((0, column), (3, 3)).copy_from(&by_rotation);
+            by_calibration.view_mut((3, column + 3), (3, 3)).copy_from(&world_from_camera);
         }
         (carried * own, by_calibration)
     }

@@ -23,6 +23,9 @@ const READOUT_SIGMA_S: f64 = 0.02;
 /// Prior standard deviation of each component of the rotation of an IMU on the gimbal relative to the rig, in radians:
 /// boards are soldered and screwed to within a degree.
 const GIMBAL_IMU_ROTATION_SIGMA_RAD: f64 = 0.02;
+/// Prior standard deviation of each component of the position of an IMU on the gimbal relative to the rig, in metres: a
+/// board within a camera's housing is known to its half.
+const GIMBAL_IMU_TRANSLATION_SIGMA_M: f64 = 0.02;
 /// Prior of intrinsics for which the rig has none: those of a target calibration, used at another focus.
 const INTRINSICS_SIGMA: IntrinsicsSigma = IntrinsicsSigma { focal_ratio: 0.02, centre_px: 10.0, distortion: 0.03 };
 
@@ -38,16 +41,21 @@ impl SensorColumn {
         Self { parameter: ParameterId::readout(0), given: given_s, sigma: sigma_s.unwrap_or(READOUT_SIGMA_S) }
     }
 
-    /// Orientation of the IMU on the gimbal, as a rotation vector relative to the rig's, and its time offset.
+    /// Orientation of the IMU on the gimbal, as a rotation vector relative to the rig's, its position relative to the
+    /// rig's in the camera's frame, and its time offset.
     pub(crate) fn gimbal_imu(given_timeshift_s: f64) -> Vec<Self> {
-        let rotation = Quantity::ROTATION.map(|quantity| Self {
+        let pose = Quantity::TRANSFORM.map(|quantity| Self {
             parameter: ParameterId { part: ParameterPart::GimbalImu, quantity },
             given: 0.0,
-            sigma: GIMBAL_IMU_ROTATION_SIGMA_RAD,
+            sigma: if Quantity::ROTATION.contains(&quantity) {
+                GIMBAL_IMU_ROTATION_SIGMA_RAD
+            } else {
+                GIMBAL_IMU_TRANSLATION_SIGMA_M
+            },
         });
         let shift =
             Self { parameter: ParameterId::GIMBAL_IMU_TIMESHIFT, given: given_timeshift_s, sigma: CLOCK_SIGMA_S };
-        rotation.into_iter().chain([shift]).collect()
+        pose.into_iter().chain([shift]).collect()
     }
 
     /// Intrinsics of a camera: focal lengths, principal point, and the first distortion coefficients if the lens model

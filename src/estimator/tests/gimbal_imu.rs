@@ -111,12 +111,13 @@ fn without_encoders_the_second_imu_improves_trajectory_and_joint_angles() {
 }
 
 #[test]
-fn orientation_and_time_offset_of_the_second_imu_are_estimated() {
+fn pose_and_time_offset_of_the_second_imu_are_estimated() {
     let flight = synthetic_tracks(&options(7));
     let turned = so3::exp(&Vector3::new(0.02, -0.015, 0.01));
     let mut given = config(&flight);
     let imu = given.gimbal_imu.as_mut().unwrap();
     imu.camera_from_imu.rotation *= turned;
+    imu.camera_from_imu.translation_m += Vector3::new(0.02, 0.01, -0.03);
     let (wrong_m, ..) = run(&flight, given.clone());
     let (error_m, _, _, last) = run(&flight, EstimatorConfig { estimate_gimbal_imu: true, ..given });
     let calibration = &last.calibration;
@@ -124,6 +125,9 @@ fn orientation_and_time_offset_of_the_second_imu_are_estimated() {
         ("imu1.rx", -0.02, 0.003),
         ("imu1.ry", 0.015, 0.003),
         ("imu1.rz", -0.01, 0.003),
+        ("imu1.tx", -0.02, 0.002),
+        ("imu1.ty", -0.01, 0.002),
+        ("imu1.tz", 0.03, 0.002),
         ("imu1.timeshift", 0.0, 0.002),
     ] {
         let id = ParameterNames::default().parse(name).unwrap();

@@ -53,7 +53,7 @@ impl RunSpec {
         ),
         Key::<Self>::switch(
             SensorParameters::GimbalImu.key(),
-            "estimate orientation and time offset of the IMU on the gimbal",
+            "estimate pose and time offset of the IMU on the gimbal",
             |spec| &mut spec.gimbal_imu_axes,
         ),
         Key::<Self>::switch(

@@ -109,20 +109,24 @@ fn has_imu_columns(estimate: &CalibrationEstimate) -> bool {
     estimate.parameters.iter().any(|parameter| is_intrinsic(parameter.part))
 }
 
-/// A rig's values of those of `parameters` that belong to the IMU on the gimbal: its orientation relative to `given`, and
-/// its time offset.
+/// A rig's values of those of `parameters` that belong to the IMU on the gimbal: its pose relative to `given`, and its
+/// time offset.
 fn gimbal_imu_columns(rig: &Rig, given: &Rig, parameters: &[ParameterId]) -> Vec<(ParameterId, f64)> {
     let (Some(imu), Some(given)) = (&rig.gimbal_imu, &given.gimbal_imu) else { return Vec::new() };
     let rotation = so3::log(&(given.camera_from_imu.rotation.inverse() * imu.camera_from_imu.rotation));
+    let offset_m = imu.camera_from_imu.translation_m - given.camera_from_imu.translation_m;
+    let place = |among: [Quantity; 3], wanted: Quantity| among.iter().position(|known| *known == wanted);
     let value = |quantity: Quantity| match quantity {
         Quantity::Timeshift => Some(imu.timeshift_s),
-        _ => Quantity::ROTATION.iter().position(|known| *known == quantity).map(|axis| rotation[axis]),
+        _ => place(Quantity::ROTATION, quantity)
+            .map(|axis| rotation[axis])
+            .or_else(|| place(Quantity::TRANSLATION, quantity).map(|axis| offset_m[axis])),
     };
     let own = parameters.iter().filter(|parameter| parameter.part == ParameterPart::GimbalImu);
     own.filter_map(|parameter| Some((*parameter, value(parameter.quantity)?))).collect()
 }
 
-/// Sets orientation and time offset of the IMU on the gimbal to estimated values.
+/// Sets pose and time offset of the IMU on the gimbal to estimated values.
 fn set_gimbal_imu(rig: &mut Rig, columns: &[(ParameterId, f64)]) {
     let value = |quantity: Quantity| {
         let wanted = ParameterId { part: ParameterPart::GimbalImu, quantity };
@@ -131,6 +135,9 @@ fn set_gimbal_imu(rig: &mut Rig, columns: &[(ParameterId, f64)]) {
     let Some(imu) = &mut rig.gimbal_imu else { return };
     if let [Some(x), Some(y), Some(z)] = Quantity::ROTATION.map(value) {
         imu.camera_from_imu.rotation *= so3::exp(&Vector3::new(x, y, z));
+    }
+    if let [Some(x), Some(y), Some(z)] = Quantity::TRANSLATION.map(value) {
+        imu.camera_from_imu.translation_m += Vector3::new(x, y, z);
     }
     imu.timeshift_s = value(Quantity::Timeshift).unwrap_or(imu.timeshift_s);
 }
