@@ -221,7 +221,7 @@ impl ParameterPart {
             Self::Encoder => matches!(quantity, Timeshift),
             Self::Gyroscope => matches!(quantity, Sx | Sy | Sz | Mxy | Mxz | Myz | Rx | Ry | Rz),
             Self::Accelerometer => matches!(quantity, Sx | Sy | Sz | Mxy | Mxz | Myz),
-            Self::GimbalImu => matches!(quantity, Rx | Ry | Rz | Timeshift),
+            Self::GimbalImu => matches!(quantity, Rx | Ry | Rz | Tx | Ty | Tz | Timeshift),
         }
     }
 }
@@ -265,9 +265,8 @@ impl Named for Quantity {
 impl Quantity {
     /// Columns of a rotation vector.
     pub const ROTATION: [Self; 3] = [Self::Rx, Self::Ry, Self::Rz];
-    /// Columns of a rigid transform: rotation vector, then translation.
     pub const TRANSLATION: [Self; 3] = [Self::Tx, Self::Ty, Self::Tz];
-
+    /// Columns of a rigid transform: rotation vector, then translation.
     pub const TRANSFORM: [Self; 6] = [Self::Rx, Self::Ry, Self::Rz, Self::Tx, Self::Ty, Self::Tz];
     /// Columns of a Denavit–Hartenberg link.
     pub const LINK: [Self; 4] = [Self::Theta, Self::D, Self::A, Self::Alpha];
@@ -436,7 +435,7 @@ mod tests {
                     parameters.extend(Quantity::SCALE_MISALIGNMENT.map(of(sensor)));
                 }
                 parameters.push(ParameterId { part: ParameterPart::Gyroscope, quantity: Quantity::Rx });
-                parameters.push(ParameterId { part: ParameterPart::GimbalImu, quantity: Quantity::Rx });
+                parameters.extend(Quantity::TRANSFORM.map(of(ParameterPart::GimbalImu)));
                 parameters.push(ParameterId::GIMBAL_IMU_TIMESHIFT);
                 parameters.extend(
                     Quantity::TRANSFORM.map(|quantity| ParameterId { part: ParameterPart::ImuFromCamera(1), quantity }),
