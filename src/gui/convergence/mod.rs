@@ -77,7 +77,7 @@ impl Panel for ConvergencePanel {
             ui.advance_cursor_after_rect(rows);
             available = below.with_min_y(ui.cursor().top());
         }
-        if !ctx.presentation.is_figure() && prior_ui(ui, ctx) {
+        if prior_ui(ui, ctx) {
             available = available.with_min_y(ui.cursor().top());
         }
         let groups = groups_of(&parameters);
