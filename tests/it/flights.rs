@@ -60,6 +60,30 @@ fn a_run_starts_from_the_posterior_of_another_one() {
     dcvins(at, &[&shot[..], &["a/minimal", "-o", "shot.png"]].concat(), 0, &[]);
     dcvins(at, &[&shot[..], &["none", "-o", "none.png"]].concat(), 1, &["OUT/NAME", "posterior.json"]);
 
+    // A saved session keeps it.
+    dcvins(at, &[&shot[..], &["a/minimal", "--prior-growth", "2", "--csv", "-o", "direct.png"]].concat(), 0, &[]);
+    let session = |prior: &Path| {
+        let session = serde_json::json!({
+            "session_version": 2,
+            "log": { "path": &garden, "bytes": 0, "crc32": 0 },
+            "prior": { "folder": prior, "growth": 2.0 },
+            "start_s": 4.0,
+            "duration_s": null,
+            "runs": ["minimal"],
+            "forks": [],
+            "breakpoints": [],
+            "cursor_ns": 0,
+            "layout": null,
+        });
+        fs::write(at.join("kept.session.json"), session.to_string()).expect("it can be written");
+    };
+    let kept = ["screenshot", "kept.session.json", "--panel", "convergence", "--csv", "-o", "kept.png"];
+    session(&a);
+    dcvins(at, &kept, 0, &[]);
+    assert!(text("direct.csv") == text("kept.csv"), "the session starts from another calibration");
+    session(&at.join("none"));
+    dcvins(at, &kept, 1, &["OUT/NAME", "posterior.json"]);
+
     // A rig that was edited later is another mechanism than that of the covariance.
     let rig = fs::read_to_string(a.join("rig.yaml")).expect("the rig");
     let edited = rig.replacen("\n    d: 0.", "\n    d: 0.1", 1);
