@@ -324,7 +324,7 @@ pub fn urdf(bytes: &[u8]) {
 pub fn session(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else { return };
     if let Ok(session) = SavedSession::from_text(text) {
-        drop(session.request(None));
+        drop(session.request());
         for breakpoint in &session.breakpoints {
             drop(breakpoint.condition.parse::<Condition>());
         }

@@ -39,7 +39,7 @@ pub(crate) fn open_log(
                 progress(OpenProgress { text: stage_text(stage, of), ratio })
             });
         let saved = saved.map_err(|error| failure(&error))?;
-        let session = open_session(&saved).map_err(|error| problem(error.to_string()))?;
+        let session = open_session(&saved, &sources.main).map_err(|error| problem(error.to_string()))?;
         return Ok(OpenedLog { log: Box::new(session), remembered: sources.main, notices: Vec::new() });
     }
     let sources = LogSources { rig: request.rig.clone().or(sources.rig), ..sources };

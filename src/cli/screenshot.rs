@@ -422,7 +422,7 @@ impl Shown {
             }
             let saved = prepared_session(&arguments.log, &arguments.estimation.limits.limits())?;
             let (start_s, duration_s) = (saved.start_s, saved.duration_s);
-            (Source::Saved(Box::new(open_session(&saved)?)), start_s, duration_s)
+            (Source::Saved(Box::new(open_session(&saved, &arguments.log)?)), start_s, duration_s)
         } else {
             let plan = SessionPlan::open(&arguments.estimation.request(arguments.log.clone())?)?;
             let images = ImageReader::new(Arc::clone(&plan.log), &plan.rig);

@@ -23,14 +23,13 @@ pub fn read_session(path: &Path) -> Result<SavedSession, ExportError> {
         .map_err(|problem| ExportError::Session { problem: Box::new(problem), path: path.to_owned() })
 }
 
-/// Opens the log of a saved session, with the calibration of earlier flights that its runs start from, and starts the
-/// runs.
+/// Starts the runs of a saved session, from the calibration of earlier flights if it has one; `path` is that of the session.
 ///
 /// # Errors
 /// If the log or that calibration cannot be opened, or an entry of the session is invalid.
-pub fn open_session(saved: &SavedSession) -> Result<Session, ExportError> {
+pub fn open_session(saved: &SavedSession, path: &Path) -> Result<Session, ExportError> {
     let prior = saved.prior.as_ref().map(|prior| read_prior(&prior.folder, prior.growth)).transpose()?;
     saved
         .open(prior.map(Arc::new))
-        .map_err(|problem| ExportError::Session { problem: Box::new(problem), path: saved.log.path.clone() })
+        .map_err(|problem| ExportError::Session { problem: Box::new(problem), path: path.to_owned() })
 }

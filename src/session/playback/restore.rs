@@ -10,13 +10,13 @@ use super::saved::{
 };
 use super::session::Session;
 use crate::session::breakpoints::Condition;
-use crate::session::plan::{FlightPrior, ForkChanges, SessionPlan, TrajectorySource, TrajectorySpec};
+use crate::session::plan::{FlightPrior, ForkChanges, SessionPlan, SessionRequest, TrajectorySource, TrajectorySpec};
 
 impl SavedSession {
-    /// Opens the log and starts the runs; `prior` is the calibration at [`Self::prior`]. Forks are started when their parents reach the fork's first step, and the
-    /// cursor is set to its position when all runs have reached it.
+    /// Opens the log and starts the runs; `prior` is the calibration at [`Self::prior`]. Forks are started when their
+    /// parents reach the fork's first step, and the cursor is set to its position when all runs have reached it.
     pub fn open(&self, prior: Option<Arc<FlightPrior>>) -> Result<Session, SavedSessionError> {
-        let plan = SessionPlan::open(&self.request(prior)?)?;
+        let plan = SessionPlan::open(&SessionRequest { prior, ..self.request()? })?;
         let conditions: Result<Vec<Condition>, _> = self.breakpoints.iter().map(|it| it.condition.parse()).collect();
         let conditions = conditions.map_err(entry_error)?;
         let mut forks = Vec::new();
@@ -160,7 +160,6 @@ fn absolute_source(source: &TrajectorySource) -> TrajectorySource {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::session::plan::SessionRequest;
     use crate::session::playback::{Command, Marker};
 
     fn garden(duration_s: f64) -> SessionPlan {

@@ -3,7 +3,6 @@
 //! Results are not stored; they are recomputed to the same bits.
 
 use std::path::PathBuf;
-use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -11,9 +10,7 @@ use thiserror::Error;
 use super::markers::Marker;
 use crate::flight_log::LogLimits;
 use crate::sensors::LeverArm;
-use crate::session::plan::{
-    FlightPrior, ForkChanges, RunSpec, SessionError, SessionRequest, TrajectorySource, TrajectorySpec,
-};
+use crate::session::plan::{ForkChanges, RunSpec, SessionError, SessionRequest, TrajectorySource, TrajectorySpec};
 
 /// Version of the file format that this program writes.
 pub(super) const VERSION: u32 = 2;
@@ -134,8 +131,8 @@ impl SavedSession {
         text
     }
 
-    /// Request that opens the log and its runs; `prior` is the calibration at [`Self::prior`].
-    pub fn request(&self, prior: Option<Arc<FlightPrior>>) -> Result<SessionRequest, SavedSessionError> {
+    /// Request that opens the log and its runs, without the calibration at [`Self::prior`].
+    pub fn request(&self) -> Result<SessionRequest, SavedSessionError> {
         let specs: Result<Vec<RunSpec>, _> = self.runs.iter().map(|run| run.parse()).collect();
         let trajectories: Result<Vec<TrajectorySpec>, _> = self.trajectories.iter().map(|text| text.parse()).collect();
         let truth = self.truth_trajectory.as_ref().map(|text| text.parse::<TrajectorySource>());
@@ -148,7 +145,7 @@ impl SavedSession {
             rig_path: self.rig.clone(),
             ground_truth_path: self.ground_truth.clone(),
             specs: specs.map_err(entry_error)?,
-            prior,
+            prior: None,
             trajectories: trajectories.map_err(entry_error)?,
             start_s: self.start_s,
             duration_s: self.duration_s,

@@ -109,18 +109,15 @@ fn has_imu_columns(estimate: &CalibrationEstimate) -> bool {
     estimate.parameters.iter().any(|parameter| is_intrinsic(parameter.part))
 }
 
-/// A rig's values of those of `parameters` that belong to the IMU on the gimbal: its pose relative to `given`, and its
-/// time offset.
+/// A rig's values of those of `parameters` that belong to the IMU on the gimbal: pose relative to `given`, time offset.
 fn gimbal_imu_columns(rig: &Rig, given: &Rig, parameters: &[ParameterId]) -> Vec<(ParameterId, f64)> {
     let (Some(imu), Some(given)) = (&rig.gimbal_imu, &given.gimbal_imu) else { return Vec::new() };
     let rotation = so3::log(&(given.camera_from_imu.rotation.inverse() * imu.camera_from_imu.rotation));
     let offset_m = imu.camera_from_imu.translation_m - given.camera_from_imu.translation_m;
-    let place = |among: [Quantity; 3], wanted: Quantity| among.iter().position(|known| *known == wanted);
+    let pose = [rotation.as_slice(), offset_m.as_slice()].concat();
     let value = |quantity: Quantity| match quantity {
         Quantity::Timeshift => Some(imu.timeshift_s),
-        _ => place(Quantity::ROTATION, quantity)
-            .map(|axis| rotation[axis])
-            .or_else(|| place(Quantity::TRANSLATION, quantity).map(|axis| offset_m[axis])),
+        _ => Quantity::TRANSFORM.iter().position(|known| *known == quantity).map(|place| pose[place]),
     };
     let own = parameters.iter().filter(|parameter| parameter.part == ParameterPart::GimbalImu);
     own.filter_map(|parameter| Some((*parameter, value(parameter.quantity)?))).collect()
@@ -133,11 +130,9 @@ fn set_gimbal_imu(rig: &mut Rig, columns: &[(ParameterId, f64)]) {
         columns.iter().find(|(parameter, _)| *parameter == wanted).map(|(_, value)| *value)
     };
     let Some(imu) = &mut rig.gimbal_imu else { return };
-    if let [Some(x), Some(y), Some(z)] = Quantity::ROTATION.map(value) {
-        imu.camera_from_imu.rotation *= so3::exp(&Vector3::new(x, y, z));
-    }
-    if let [Some(x), Some(y), Some(z)] = Quantity::TRANSLATION.map(value) {
-        imu.camera_from_imu.translation_m += Vector3::new(x, y, z);
+    if let [Some(rx), Some(ry), Some(rz), Some(tx), Some(ty), Some(tz)] = Quantity::TRANSFORM.map(value) {
+        imu.camera_from_imu.rotation *= so3::exp(&Vector3::new(rx, ry, rz));
+        imu.camera_from_imu.translation_m += Vector3::new(tx, ty, tz);
     }
     imu.timeshift_s = value(Quantity::Timeshift).unwrap_or(imu.timeshift_s);
 }
