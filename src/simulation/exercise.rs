@@ -41,25 +41,27 @@ pub struct JointSwing {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Exercise {
     pub vehicle: VehicleSwing,
+    /// Ratio of the vehicle's swing to its full amplitude.
+    pub vehicle_ratio: f64,
     pub joint: Option<JointSwing>,
 }
 
 /// Amplitude of slow swings, to each side.
-pub const SWING_M: f64 = 0.75;
+const SWING_M: f64 = 0.75;
 /// Period of slow swings.
 const SWING_PERIOD_S: f64 = 4.0;
 /// Amplitude of quick swings, to each side.
-pub const ROCK_M: f64 = 0.12;
+const ROCK_M: f64 = 0.12;
 /// Period of quick swings: 3 m/s² and 17° of tilt at the turning points.
 pub const ROCK_PERIOD_S: f64 = 1.25;
 /// Amplitude of the vehicle's yaw.
-pub const YAW_SWING_RAD: f64 = 20.0 * std::f64::consts::PI / 180.0;
+const YAW_SWING_RAD: f64 = 20.0 * std::f64::consts::PI / 180.0;
 /// Period of the vehicle's yaw.
 const YAW_PERIOD_S: f64 = 3.3;
 /// Period of a joint's swing; in no simple ratio to the vehicle's periods, so that the two are not correlated.
 pub const JOINT_PERIOD_S: f64 = 2.6;
 /// Time in which a swing grows to its amplitude.
-const GROWTH_S: f64 = 1.0;
+pub const GROWTH_S: f64 = 1.0;
 
 fn swing(time_s: f64, period_s: f64) -> f64 {
     let fraction = (time_s / GROWTH_S).clamp(0.0, 1.0);
@@ -67,10 +69,26 @@ fn swing(time_s: f64, period_s: f64) -> f64 {
 }
 
 impl Exercise {
+    /// Exercise with the full amplitude of the vehicle's swing.
+    pub const fn full(vehicle: VehicleSwing, joint: Option<JointSwing>) -> Self {
+        Self { vehicle, vehicle_ratio: 1.0, joint }
+    }
+
+    /// Amplitude of the vehicle's swing, to each side: in metres, of the yaw in radians.
+    pub fn vehicle_amplitude(&self) -> f64 {
+        let full = match self.vehicle {
+            VehicleSwing::Hover => 0.0,
+            VehicleSwing::Forward | VehicleSwing::Sideways | VehicleSwing::UpDown => SWING_M,
+            VehicleSwing::Roll | VehicleSwing::Pitch => ROCK_M,
+            VehicleSwing::Yaw => YAW_SWING_RAD,
+        };
+        full * self.vehicle_ratio
+    }
+
     /// Displacement of the vehicle from its start: forward, left, up, in metres.
     pub fn shift_m(&self, time_s: f64) -> Vector3<f64> {
-        let slow = SWING_M * swing(time_s, SWING_PERIOD_S);
-        let quick = ROCK_M * swing(time_s, ROCK_PERIOD_S);
+        let slow = self.vehicle_amplitude() * swing(time_s, SWING_PERIOD_S);
+        let quick = self.vehicle_amplitude() * swing(time_s, ROCK_PERIOD_S);
         match self.vehicle {
             VehicleSwing::Hover | VehicleSwing::Yaw => Vector3::zeros(),
             VehicleSwing::Forward => Vector3::new(slow, 0.0, 0.0),
@@ -83,7 +101,7 @@ impl Exercise {
 
     /// Rotation of the vehicle about the vertical, in radians.
     pub fn heading_change_rad(&self, time_s: f64) -> f64 {
-        if self.vehicle == VehicleSwing::Yaw { YAW_SWING_RAD * swing(time_s, YAW_PERIOD_S) } else { 0.0 }
+        if self.vehicle == VehicleSwing::Yaw { self.vehicle_amplitude() * swing(time_s, YAW_PERIOD_S) } else { 0.0 }
     }
 
     /// Change of a joint's angle from its start, in radians.

@@ -48,7 +48,7 @@ pub use disturbances::Disturbances;
 pub use equipment::{IntrinsicsError, Lens};
 #[cfg(feature = "logs")]
 pub use error::SimulationError;
-pub use exercise::{Exercise, JOINT_PERIOD_S, JointSwing, ROCK_M, ROCK_PERIOD_S, SWING_M, VehicleSwing, YAW_SWING_RAD};
+pub use exercise::{Exercise, GROWTH_S, JOINT_PERIOD_S, JointSwing, ROCK_PERIOD_S, VehicleSwing};
 pub use experiment::{Environment, Experiment, WorldKind};
 pub use gimbal::JointMotion;
 pub use imu::SimulatedBias;

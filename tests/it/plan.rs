@@ -112,7 +112,17 @@ fn a_planned_motion_is_flown_by_the_simulation() {
             assert!(said.contains(word), "{motion} should give '{word}': {said}");
         }
     };
-    simulate("plan/motion.csv", 0, &["t2.mcap: 8.0 s", "16 images"]);
+    plan(
+        folder.path(),
+        &[data("garden.rig.yaml").as_str(), "-o", "steps", "--by-hand", "--duration", "8"],
+        "2",
+        0,
+        &[],
+    );
+    for motion in ["plan/motion.csv", "plan/listed.csv", "steps/motion.csv"] {
+        simulate(motion, 0, &["t2.mcap: 8.0 s", "16 images"]);
+        fs::remove_file(folder.path().join("t2.mcap")).expect("the log can be removed");
+    }
     simulate("plan/sigma.csv", 1, &["cannot read the motion: the columns are t_s, parameter", "sigma.csv"]);
     simulate("plan/none.csv", 1, &["cannot read", "none.csv"]);
 }

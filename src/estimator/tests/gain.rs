@@ -152,7 +152,7 @@ fn information_gain_is_attributed_to_the_moving_joint() {
             features: 80,
             motion: SyntheticMotion::Hover,
             look_around_rad: 0.3,
-            exercise: Some((4.5, Exercise { vehicle: VehicleSwing::Hover, joint: Some(swing) })),
+            exercise: Some((4.5, Exercise::full(VehicleSwing::Hover, Some(swing)))),
             ..SyntheticOptions::default()
         });
         let config = fixture::config(&flight.given_rig, Parameterization::Minimal, EstimatorOptions::default());

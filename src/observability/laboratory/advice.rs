@@ -15,9 +15,7 @@ use crate::estimator::{HypotheticalFrame, NavigationState};
 use crate::geometry::{Dimension, RigidTransform, ns_from_seconds, so3};
 use crate::gimbal::ParameterId;
 use crate::sensors::ImuSample;
-use crate::simulation::{
-    Exercise, JOINT_PERIOD_S, JointSwing, ROCK_M, ROCK_PERIOD_S, SWING_M, VehicleSwing, YAW_SWING_RAD,
-};
+use crate::simulation::{Exercise, JOINT_PERIOD_S, JointSwing, ROCK_PERIOD_S, VehicleSwing};
 
 /// Duration of a candidate, in seconds.
 pub const ADVICE_DURATION_S: f64 = 4.0;
@@ -169,7 +167,7 @@ pub(super) fn candidates(situation: &Situation) -> Vec<Exercise> {
             swings.push(Some(JointSwing { joint, amplitude_rad }));
         }
     }
-    let with = |vehicle: VehicleSwing| swings.iter().map(move |joint| Exercise { vehicle, joint: *joint });
+    let with = |vehicle: VehicleSwing| swings.iter().map(move |joint| Exercise::full(vehicle, *joint));
     VehicleSwing::ALL.into_iter().flat_map(with).collect()
 }
 
@@ -278,16 +276,15 @@ pub(super) fn words(exercise: &Exercise, joints: &[LaboratoryJoint]) -> String {
             format!("rotate {name} ±{size_deg:.0}°")
         }
     });
-    let yaw_deg = YAW_SWING_RAD.to_degrees();
-    let (rock_m, period_s) = (ROCK_M, ROCK_PERIOD_S);
+    let (size, period_s) = (exercise.vehicle_amplitude(), ROCK_PERIOD_S);
     let vehicle = match exercise.vehicle {
         VehicleSwing::Hover => "hover".to_owned(),
-        VehicleSwing::Forward => format!("translate forward and back ±{SWING_M} m"),
-        VehicleSwing::Sideways => format!("translate sideways ±{SWING_M} m"),
-        VehicleSwing::UpDown => format!("climb and descend ±{SWING_M} m"),
-        VehicleSwing::Roll => format!("translate sideways ±{rock_m} m every {period_s} s (roll)"),
-        VehicleSwing::Pitch => format!("translate forward and back ±{rock_m} m every {period_s} s (pitch)"),
-        VehicleSwing::Yaw => format!("yaw vehicle ±{yaw_deg:.0}°"),
+        VehicleSwing::Forward => format!("translate forward and back ±{size:.2} m"),
+        VehicleSwing::Sideways => format!("translate sideways ±{size:.2} m"),
+        VehicleSwing::UpDown => format!("climb and descend ±{size:.2} m"),
+        VehicleSwing::Roll => format!("translate sideways ±{size:.2} m every {period_s} s (roll)"),
+        VehicleSwing::Pitch => format!("translate forward and back ±{size:.2} m every {period_s} s (pitch)"),
+        VehicleSwing::Yaw => format!("yaw vehicle ±{:.0}°", size.to_degrees()),
     };
     match swing {
         Some(swing) => format!("{swing}, {vehicle}"),

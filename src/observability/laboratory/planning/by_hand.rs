@@ -44,7 +44,7 @@ pub struct HandStep {
 pub(super) fn choose(problem: &SearchProblem<'_>, duration_s: f64) -> Vec<HandMove> {
     let &SearchProblem { situation, objective, ref layout, .. } = problem;
     let columns = situation.information.ncols();
-    let candidates = combined(situation);
+    let candidates = combined(problem, layout.length_s);
     let mut chosen: Vec<HandMove> = Vec::new();
     let mut windows: Vec<WindowRows> = Vec::new();
     for window in 0..layout.count {

@@ -24,6 +24,6 @@ impl RepeatedMove {
             let flown = problem.evaluate(starts::as_described(problem, duration_s, &[choice]))?;
             Some(Self { choice, information: problem.total(&flown.windows), motion: flown.motion })
         };
-        listed(problem.situation).into_par_iter().filter_map(of).collect()
+        listed(problem, duration_s).into_par_iter().filter_map(of).collect()
     }
 }

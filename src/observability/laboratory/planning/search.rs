@@ -16,9 +16,9 @@ use crate::geometry::SplitMix64;
 use crate::simulation::MotionSplines;
 
 /// Step at which rates and accelerations are compared with the limits during the search.
-const CHECK_STEP_S: f64 = 0.04;
+pub(super) const CHECK_STEP_S: f64 = 0.04;
 /// Ratio of the limits within which the search stays, for extremes between its steps.
-const MARGIN: f64 = 0.97;
+pub(super) const MARGIN: f64 = 0.97;
 /// Knots on either side of a control value on which it has an effect.
 const REACH_KNOTS: f64 = 6.0;
 /// Half widths of bumps, in knots.

@@ -6,16 +6,14 @@ use super::super::Situation;
 use super::limits::MotionLimits;
 use super::moves::HandMove;
 use super::search::SearchProblem;
-use crate::geometry::SplitMix64;
-use crate::simulation::MotionSplines;
+use crate::geometry::{SplitMix64, smooth_step};
+use crate::simulation::{GROWTH_S, MotionSplines};
 
 /// Distance of the knots of a planned motion, in seconds.
 pub const PLAN_KNOT_S: f64 = 0.5;
 /// Distance of the knots of moves with words, in seconds: a spline with control values on a swing of 1.25 s, the shortest
 /// one, then has 95 % of its amplitude.
 const DESCRIBED_KNOT_S: f64 = 0.1;
-/// Time over which a move fades out, in seconds.
-const FADING_S: f64 = 1.0;
 /// Free control values at either end over which a random start grows to its size.
 const GROWTH_POINTS: usize = 4;
 /// Shortest and longest period of the waves of a random start, in seconds.
@@ -53,7 +51,8 @@ pub(super) fn as_described(problem: &SearchProblem<'_>, duration_s: f64, moves: 
     curves(problem, duration_s, moves, DESCRIBED_KNOT_S)
 }
 
-/// Splines with these knots, whose control values are those of the moves; every move fades out at its end.
+/// Splines with these knots, whose control values are those of the moves; every move fades out at its end as it grows at
+/// its start.
 fn curves(problem: &SearchProblem<'_>, duration_s: f64, moves: &[HandMove], knot_s: f64) -> MotionSplines {
     let mut motion = at_rest(problem.situation, duration_s, knot_s);
     let joints = motion.joint_count();
@@ -62,14 +61,8 @@ fn curves(problem: &SearchProblem<'_>, duration_s: f64, moves: &[HandMove], knot
     fill(&mut motion, problem.limits, 0, |channel, time_s| {
         let index = ((time_s / length_s) as usize).min(last);
         let since_s = time_s - index as f64 * length_s;
-        let exercise = moves[index].exercise;
-        let change = match channel.checked_sub(joints) {
-            None => moves[index].joint_rad(channel, since_s),
-            Some(axis @ 0..3) => exercise.shift_m(since_s)[axis],
-            Some(_) => exercise.heading_change_rad(since_s),
-        };
-        let left = ((length_s - since_s) / FADING_S).clamp(0.0, 1.0);
-        change * left.powi(3) * (left * (left * 6.0 - 15.0) + 10.0)
+        let left = ((length_s - since_s) / GROWTH_S).clamp(0.0, 1.0);
+        moves[index].change(channel, joints, since_s) * smooth_step(left)
     });
     motion
 }

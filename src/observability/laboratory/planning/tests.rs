@@ -1,10 +1,12 @@
 use std::ops::ControlFlow;
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Vector3};
 
 use super::super::{LaboratoryJoint, Mechanism, Situation};
 use super::keyframes::keyframe_times_s;
 use super::objective::Objective;
+use super::repeated::RepeatedMove;
+use super::search::SearchProblem;
 use super::windows::{WindowLayout, WindowRows, joined, rows_of_interval, rows_of_keyframes, trajectory};
 use super::{
     MotionLimits, MotionPlan, MotionPlanError, MotionPredictor, MotionProblem, MotionStart, PlanCriterion, PlanOptions,
@@ -138,6 +140,27 @@ fn moves_by_hand_lower_sigma_step_by_step() {
     }
     assert!(by_hand.steps.iter().any(|step| step.words.contains("more slowly")), "{by_hand}");
     assert_eq!(by_hand.steps.last().unwrap().worst_ratio, by_hand.table.worst_ratio);
+    let exceeded = |limits: &MotionLimits, motion: &MotionSplines| -> Vec<String> {
+        let reached = limits.compare(motion, &situation.joint_names());
+        reached.into_iter().filter(|limit| !limit.is_kept()).map(|limit| limit.quantity).collect()
+    };
+    assert_eq!(exceeded(&options.limits, &by_hand.motion), [""; 0], "{by_hand}");
+    // In a small room and with slow joints the moves are smaller, and say so.
+    let reach_m = Vector3::repeat(0.3);
+    let limits = MotionLimits { reach_m, joint_rate_rad_per_s: 0.2, ..options.limits.clone() };
+    let in_room = plan_by_hand(&situation, &PlanOptions { limits: limits.clone(), ..options.clone() }).unwrap();
+    assert_eq!(exceeded(&limits, &in_room.motion), [""; 0], "{in_room}");
+    assert!(in_room.table.worst_ratio > by_hand.table.worst_ratio, "{in_room}");
+    assert!(in_room.steps.iter().all(|step| !step.words.contains("±20°")), "{in_room}");
+    let problem = SearchProblem {
+        situation: &situation,
+        objective: &Objective::new(&situation, PlanCriterion::Worst, &[]).unwrap(),
+        limits: &limits,
+        layout: WindowLayout::fine(12.0),
+    };
+    for repeated in RepeatedMove::all(&problem, 12.0) {
+        assert_eq!(exceeded(&limits, &repeated.motion), [""; 0], "{:?}", repeated.choice);
+    }
 }
 
 #[test]

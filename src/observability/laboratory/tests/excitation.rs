@@ -90,7 +90,7 @@ fn sigma(rank: &RankReport, direction: &[f64]) -> f64 {
 /// Runs the suggested motion and every `every`-th of the others from the same state; returns the advice and,
 /// for each motion, the predicted and the estimated ratio of σ along the least observable direction.
 fn run_advised(seed: u64, every: usize) -> (Advice, Vec<(String, f64, f64)>) {
-    let rest = Exercise { vehicle: VehicleSwing::Hover, joint: None };
+    let rest = Exercise::full(VehicleSwing::Hover, None);
     let warm_up = flight(rest, seed);
     let mut start = estimator(&warm_up.given_rig, Parameterization::Minimal, true);
     let (report, rank) = run_flight(&mut start, &warm_up, -1.0, SHARED_S);

@@ -9,7 +9,7 @@ use crate::simulation::{Exercise, VehicleSwing};
 
 /// Processes a flight up to 4 s. Returns the ranks of its last step, and a function that moves the last chain.
 fn moves(parameterization: Parameterization, encoder: bool) -> (RankReport, impl Fn(&SlideDirection) -> ChainSlide) {
-    let flight = flight(Exercise { vehicle: VehicleSwing::Hover, joint: None }, 7);
+    let flight = flight(Exercise::full(VehicleSwing::Hover, None), 7);
     let like = estimator(&flight.given_rig, parameterization, encoder);
     let mut config = like.config().clone();
     // First estimates belong to an earlier chain, whose directions differ slightly from those of the present one.
@@ -58,7 +58,7 @@ fn reprojections_are_unchanged_along_a_redundant_direction() {
 
 #[test]
 fn fixed_parameters_count_as_known() {
-    let flight = flight(Exercise { vehicle: VehicleSwing::Hover, joint: None }, 7);
+    let flight = flight(Exercise::full(VehicleSwing::Hover, None), 7);
     let mut estimator = estimator(&flight.given_rig, Parameterization::Classical, true);
     let (_, before) = run_flight(&mut estimator, &flight, -1.0, 4.0);
     assert_eq!((before.parameters.len(), before.rank_structural, before.deficit_parameterization), (24, 18, 6));
