@@ -76,6 +76,21 @@ impl EstimationArguments {
         [Some(log.to_owned()), rig, ground_truth].into_iter().flatten().chain(trajectories).collect()
     }
 
+    /// Checks that no argument replaces what a saved session contains.
+    ///
+    /// # Errors
+    /// If runs, or the calibration of earlier flights, are given.
+    #[cfg(feature = "gui")]
+    pub(crate) fn check_for_session(&self) -> Result<()> {
+        if !self.runs.is_empty() {
+            anyhow::bail!("a saved session contains its runs: leave --run out");
+        }
+        if self.prior.prior.is_some() {
+            anyhow::bail!("a saved session contains the prior of its runs: leave --prior out");
+        }
+        Ok(())
+    }
+
     /// The session request with these arguments.
     ///
     /// # Errors

@@ -57,6 +57,8 @@ pub(crate) fn excerpt(arguments: &ExcerptArguments) -> Result<ExitOutcome> {
         limits,
         ..SessionRequest::default()
     };
+    // Every excerpt has at least one stretch: known before the run, the others after it.
+    export::check_excerpt_folder(&arguments.out, &request.log_path, 1, arguments.force)?;
     let Some((recording, whole, plan)) = computed(&request, &interrupt)? else { return Ok(ExitOutcome::Interrupted) };
     let Some(run) = recording.runs.first() else { bail!("there is no run") };
     let collected = run.collected_information(&plan.rig).map_err(|problem| anyhow!("no excerpt: {problem}"))?;
@@ -66,7 +68,7 @@ pub(crate) fn excerpt(arguments: &ExcerptArguments) -> Result<ExitOutcome> {
     let label = &run.spec.label;
     let mut summary =
         ExcerptSummary::new(&request.log_path, label, arguments.seconds, &plan.rig, (&collected, &useful));
-    export::check_excerpt_folder(&arguments.out, &summary, arguments.force)?;
+    export::check_excerpt_folder(&arguments.out, &request.log_path, summary.stretches.len(), arguments.force)?;
     let rigs = (&*plan.rig, plan.ground_truth_rig.as_deref());
     export::write_stretches(&mut summary, &plan.log, rigs, &arguments.out)?;
     let mut prior: Option<Arc<FlightPrior>> = None;

@@ -414,12 +414,7 @@ enum Source {
 impl Shown {
     fn open(arguments: &ScreenshotArguments) -> Result<Self> {
         let (source, start_s, duration_s) = if is_session(&arguments.log) {
-            if !arguments.estimation.runs.is_empty() {
-                bail!("a saved session contains its runs: leave --run out");
-            }
-            if arguments.estimation.prior.prior.is_some() {
-                bail!("a saved session contains the prior of its runs: leave --prior out");
-            }
+            arguments.estimation.check_for_session()?;
             let saved = prepared_session(&arguments.log, &arguments.estimation.limits.limits())?;
             let (start_s, duration_s) = (saved.start_s, saved.duration_s);
             (Source::Saved(Box::new(open_session(&saved, &arguments.log)?)), start_s, duration_s)

@@ -70,6 +70,7 @@ mod window {
         if study.is_none() && given.is_some() {
             let sources = LogSources::gather(&arguments.sources, &arguments.estimation.limits.limits())?;
             if is_session(&sources.main) {
+                arguments.estimation.check_for_session()?;
                 read_session(&sources.main)?;
             } else if sources.kind.is_none() {
                 check_log(&sources, &arguments.estimation)?;

@@ -58,8 +58,6 @@ impl ExcerptSummary {
         let (collected, useful) = of;
         let names = rig.parameter_names();
         let names: Vec<String> = collected.parameters.iter().map(|parameter| names.name(*parameter)).collect();
-        let stem = log_name(log);
-        let stem = Path::new(&stem).with_extension("");
         let stretch = |(number, stretch): (usize, &UsefulStretch)| {
             let mut needed_by: Vec<(String, f64)> =
                 names.iter().cloned().zip(stretch.growth_without.iter().copied()).collect();
@@ -67,7 +65,7 @@ impl ExcerptSummary {
             needed_by.sort_by(|a, b| b.1.total_cmp(&a.1));
             needed_by.truncate(REASONS);
             ExcerptStretch {
-                log: PathBuf::from(format!("{}-{}.mcap", stem.display(), number + 1)),
+                log: stretch_file(log, number),
                 start_s: seconds_from_ns(stretch.start_ns),
                 end_s: seconds_from_ns(stretch.end_ns),
                 messages: 0,
@@ -107,13 +105,19 @@ impl ExcerptSummary {
     }
 }
 
-/// Checks that the files of an excerpt may be written into a folder.
+/// Name of the log of a stretch, counted from 0.
+fn stretch_file(log: &Path, number: usize) -> PathBuf {
+    let stem = log_name(log);
+    PathBuf::from(format!("{}-{}.mcap", Path::new(&stem).with_extension("").display(), number + 1))
+}
+
+/// Checks that an excerpt of this number of stretches of a log may be written into a folder.
 ///
 /// # Errors
 /// If the folder cannot be written, or a file exists and `force` is not given.
-pub fn check_excerpt_folder(folder: &Path, summary: &ExcerptSummary, force: bool) -> Result<(), ExportError> {
+pub fn check_excerpt_folder(folder: &Path, log: &Path, stretches: usize, force: bool) -> Result<(), ExportError> {
     output::check_folder(folder).map_err(ExportError::write(folder))?;
-    let names = summary.stretches.iter().map(|stretch| stretch.log.clone()).chain([PathBuf::from(INDEX)]);
+    let names = (0..stretches).map(|number| stretch_file(log, number)).chain([PathBuf::from(INDEX)]);
     for path in names.map(|name| folder.join(name)) {
         if path.exists() && !force {
             return Err(ExportError::Existing { problem: "it exists already".to_owned(), path });

@@ -81,6 +81,10 @@ fn a_run_starts_from_the_posterior_of_another_one() {
     session(&a);
     dcvins(at, &kept, 0, &[]);
     assert!(text("direct.csv") == text("kept.csv"), "the session starts from another calibration");
+    for command in ["view", "screenshot"] {
+        dcvins(at, &[command, "kept.session.json", "--run", "minimal", "-o", "x.png"], 1, &["leave --run out"]);
+        dcvins(at, &[command, "kept.session.json", "--prior", "a/minimal", "-o", "x.png"], 1, &["leave --prior out"]);
+    }
     session(&at.join("none"));
     dcvins(at, &kept, 1, &["OUT/NAME", "posterior.json"]);
 
