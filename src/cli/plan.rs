@@ -1,5 +1,6 @@
 //! `dcvins plan`: the motion that calibrates a rig, within the limits of its joints and of the vehicle.
 
+use std::fmt::{self, Display, Formatter};
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
@@ -8,8 +9,8 @@ use clap::{Args, ValueEnum};
 use dcvins::export::{self, PlanReport, PlannedFlight};
 use dcvins::gimbal::ParameterId;
 use dcvins::observability::laboratory::{
-    MotionLimits, MotionPlanError, PLAN_DURATION_S, PlanCriterion, PlanOptions, Situation, plan_by_hand, plan_motion,
-    scene_distances_m,
+    EnteredLimits, MotionPlanError, PLAN_DURATION_S, PLAN_SECONDS, PlanCriterion, PlanOptions, SCENE_M, Situation,
+    plan_by_hand, plan_motion, scene_distances_m,
 };
 use dcvins::sensors::Rig;
 use dcvins::session::{self, RunSpec};
@@ -18,6 +19,8 @@ use crate::cli::exit::ExitOutcome;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::terminal::{Progress, notify, print_report};
 use crate::cli::value_parsers::within;
+
+const SLOW: EnteredLimits = EnteredLimits::SLOW;
 
 #[derive(Args, Clone, Debug)]
 pub(crate) struct PlanArguments {
@@ -31,7 +34,7 @@ pub(crate) struct PlanArguments {
     #[arg(long, value_name = "SPEC", default_value = "auto")]
     pub run: RunSpec,
     /// Duration of the motion.
-    #[arg(long, value_name = "SECONDS", default_value = "20", value_parser = duration)]
+    #[arg(long, value_name = "SECONDS", default_value_t = PLAN_SECONDS, value_parser = duration)]
     pub duration: f64,
     /// Quantity to minimize.
     #[arg(long, value_enum, default_value_t = Criterion::Worst)]
@@ -43,32 +46,32 @@ pub(crate) struct PlanArguments {
     #[arg(long)]
     pub by_hand: bool,
     /// Largest rotation of a joint to either side of its middle, in degrees; the rig's ranges hold too.
-    #[arg(long, value_name = "DEG", default_value = "60", value_parser = angle)]
+    #[arg(long, value_name = "DEG", default_value_t = SLOW.joint_range_deg, value_parser = angle)]
     pub joint_range_deg: f64,
     /// Largest rate of a joint, in degrees per second.
-    #[arg(long, value_name = "DEG/S", default_value = "60", value_parser = rate)]
+    #[arg(long, value_name = "DEG/S", default_value_t = SLOW.joint_rate_deg_per_s, value_parser = rate)]
     pub joint_rate_deg: f64,
     /// Largest acceleration of a joint, in degrees per second squared.
-    #[arg(long, value_name = "DEG/S²", default_value = "180", value_parser = rate)]
+    #[arg(long, value_name = "DEG/S²", default_value_t = SLOW.joint_acceleration_deg_per_s2, value_parser = rate)]
     pub joint_acceleration_deg: f64,
     /// Largest speed of the vehicle, in metres per second.
-    #[arg(long, value_name = "M/S", default_value = "1.5", value_parser = linear)]
+    #[arg(long, value_name = "M/S", default_value_t = SLOW.speed_m_per_s, value_parser = linear)]
     pub speed: f64,
     /// Largest acceleration of the vehicle, in metres per second squared.
-    #[arg(long, value_name = "M/S²", default_value = "3", value_parser = linear)]
+    #[arg(long, value_name = "M/S²", default_value_t = SLOW.acceleration_m_per_s2, value_parser = linear)]
     pub acceleration: f64,
     /// Largest distances from the start: forward or back, sideways, up or down, in metres.
-    #[arg(long = "box", value_name = "X,Y,Z", default_value = "1.5,1.5,1", value_parser = reach)]
-    pub reach: Reach,
+    #[arg(long = "box", value_name = "X,Y,Z", default_value_t = Numbers(SLOW.reach_m), value_parser = reach)]
+    pub reach: Numbers<3>,
     /// Largest rotation of the vehicle about the vertical to either side, in degrees.
-    #[arg(long, value_name = "DEG", default_value = "60", value_parser = angle)]
+    #[arg(long, value_name = "DEG", default_value_t = SLOW.heading_deg, value_parser = angle)]
     pub heading_deg: f64,
     /// Largest rate of that rotation, in degrees per second.
-    #[arg(long, value_name = "DEG/S", default_value = "45", value_parser = rate)]
+    #[arg(long, value_name = "DEG/S", default_value_t = SLOW.heading_rate_deg_per_s, value_parser = rate)]
     pub heading_rate_deg: f64,
     /// Nearest and farthest distance of the scene, in metres.
-    #[arg(long, value_name = "NEAR,FAR", default_value = "4,12", value_parser = distance)]
-    pub distance: Distance,
+    #[arg(long, value_name = "NEAR,FAR", default_value_t = Numbers(SCENE_M), value_parser = distance)]
+    pub distance: Numbers<2>,
     /// Number of motions from which the search starts.
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=64))]
     pub starts: u16,
@@ -95,13 +98,24 @@ pub(crate) enum Criterion {
     Determinant,
 }
 
-/// Value of `--box`.
+/// Numbers between commas, the values of `--box` and `--distance`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Reach([f64; 3]);
+pub(crate) struct Numbers<const N: usize>([f64; N]);
 
-/// Value of `--distance`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Distance([f64; 2]);
+impl<const N: usize> Display for Numbers<N> {
+    fn fmt(&self, out: &mut Formatter<'_>) -> fmt::Result {
+        out.write_str(&self.0.map(|number| number.to_string()).join(","))
+    }
+}
+
+impl<const N: usize> Numbers<N> {
+    /// Numbers that are each within a range.
+    fn within(text: &str, range: &RangeInclusive<f64>) -> Option<Self> {
+        let parse = |number: &str| number.trim().parse::<f64>().ok().filter(|value| range.contains(value));
+        let numbers: Option<Vec<f64>> = text.split(',').map(parse).collect();
+        numbers.and_then(|numbers| <[f64; N]>::try_from(numbers).ok()).map(Self)
+    }
+}
 
 fn duration(text: &str) -> Result<f64, String> {
     let [shortest_s, longest_s] = PLAN_DURATION_S;
@@ -120,20 +134,13 @@ fn linear(text: &str) -> Result<f64, String> {
     within(text, 0.01..=100.0, "metres per second, or per second squared,")
 }
 
-/// Numbers between commas, each within a range.
-fn numbers<const N: usize>(text: &str, range: &RangeInclusive<f64>) -> Option<[f64; N]> {
-    let parse = |number: &str| number.trim().parse::<f64>().ok().filter(|value| range.contains(value));
-    let numbers: Option<Vec<f64>> = text.split(',').map(parse).collect();
-    numbers.and_then(|numbers| <[f64; N]>::try_from(numbers).ok())
+fn reach(text: &str) -> Result<Numbers<3>, String> {
+    let expected = || "expected three lengths from 0.01 to 100 metres, as in 1.5,1.5,1".to_owned();
+    Numbers::within(text, &(0.01..=100.0)).ok_or_else(expected)
 }
 
-fn reach(text: &str) -> Result<Reach, String> {
-    let lengths = numbers(text, &(0.01..=100.0)).map(Reach);
-    lengths.ok_or_else(|| "expected three lengths from 0.01 to 100 metres, as in 1.5,1.5,1".to_owned())
-}
-
-fn distance(text: &str) -> Result<Distance, String> {
-    let distances = numbers(text, &(0.2..=1000.0)).filter(|[near, far]| near <= far).map(Distance);
+fn distance(text: &str) -> Result<Numbers<2>, String> {
+    let distances = Numbers::within(text, &(0.2..=1000.0)).filter(|Numbers([near, far])| near <= far);
     distances.ok_or_else(|| "expected the nearest and the farthest distance, 0.2 to 1000 metres, as in 4,12".to_owned())
 }
 
@@ -184,15 +191,15 @@ pub(crate) fn plan(arguments: &PlanArguments) -> Result<ExitOutcome> {
 
 impl PlanArguments {
     fn options(&self, situation: &Situation) -> Result<PlanOptions> {
-        let limits = MotionLimits {
-            joint_rate_rad_per_s: self.joint_rate_deg.to_radians(),
-            joint_acceleration_rad_per_s2: self.joint_acceleration_deg.to_radians(),
+        let limits = EnteredLimits {
+            joint_range_deg: self.joint_range_deg,
+            joint_rate_deg_per_s: self.joint_rate_deg,
+            joint_acceleration_deg_per_s2: self.joint_acceleration_deg,
             speed_m_per_s: self.speed,
             acceleration_m_per_s2: self.acceleration,
-            reach_m: self.reach.0.into(),
-            heading_rad: self.heading_deg.to_radians(),
-            heading_rate_rad_per_s: self.heading_rate_deg.to_radians(),
-            ..MotionLimits::slow_around(situation, self.joint_range_deg.to_radians())
+            reach_m: self.reach.0,
+            heading_deg: self.heading_deg,
+            heading_rate_deg_per_s: self.heading_rate_deg,
         };
         Ok(PlanOptions {
             duration_s: self.duration,
@@ -201,7 +208,7 @@ impl PlanArguments {
                 Criterion::Determinant => PlanCriterion::Determinant,
             },
             parameters: self.chosen(situation)?,
-            limits,
+            limits: limits.around(situation),
             starts: usize::from(self.starts),
             trials: self.trials as usize,
             seed: self.seed,

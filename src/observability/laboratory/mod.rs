@@ -30,9 +30,10 @@ pub use experiment::{
 pub use mechanism::{LaboratoryJoint, Mechanism, UnknownMechanism};
 pub use motion::{LaboratoryMotion, UnknownMotion};
 pub use planning::{
-    HandPlan, HandStep, ListedComparison, MotionLimits, MotionPlan, MotionPlanError, MotionPrediction, MotionPredictor,
-    MotionProblem, MotionStart, PLAN_DURATION_S, PLAN_KNOT_S, PlanCriterion, PlanOptions, PlanStart, PlanTable,
-    PlannedParameter, ReachedLimit, SigmaRow, move_point, plan_by_hand, plan_motion, scene_distances_m,
+    EnteredLimits, HandPlan, HandStep, ListedComparison, MotionLimits, MotionPlan, MotionPlanError, MotionPrediction,
+    MotionPredictor, MotionProblem, MotionStart, PLAN_DURATION_S, PLAN_KNOT_S, PLAN_SECONDS, PlanCriterion,
+    PlanOptions, PlanStart, PlanTable, PlannedParameter, ReachedLimit, SCENE_M, SigmaRow, move_point, plan_by_hand,
+    plan_motion, scene_distances_m,
 };
 pub use report::LaboratoryReport;
 pub use sensors::{

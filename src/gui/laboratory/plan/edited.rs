@@ -117,9 +117,10 @@ impl EditedMotion {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::observability::laboratory::EnteredLimits;
 
     fn limits() -> MotionLimits {
-        MotionLimits::slow(vec![(-1.0, 1.0)])
+        EnteredLimits::SLOW.of_joints(vec![(-1.0, 1.0)])
     }
 
     #[test]

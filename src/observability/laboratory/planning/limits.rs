@@ -6,6 +6,9 @@ use serde::Serialize;
 use super::super::Situation;
 use crate::simulation::MotionSplines;
 
+/// Largest acceleration of the rotation about the vertical, in degrees/s².
+const HEADING_ACCELERATION_DEG_PER_S2: f64 = 120.0;
+
 /// Limits of joints and vehicle.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MotionLimits {
@@ -23,32 +26,63 @@ pub struct MotionLimits {
     pub heading_acceleration_rad_per_s2: f64,
 }
 
-impl MotionLimits {
-    /// Limits for joints with these ranges that suit a small multirotor, or a person with the rig in the hand.
-    pub fn slow(joints_rad: Vec<(f64, f64)>) -> Self {
-        Self {
-            joints_rad,
-            joint_rate_rad_per_s: 60_f64.to_radians(),
-            joint_acceleration_rad_per_s2: 180_f64.to_radians(),
-            speed_m_per_s: 1.5,
-            acceleration_m_per_s2: 3.0,
-            reach_m: Vector3::new(1.5, 1.5, 1.0),
-            heading_rad: 60_f64.to_radians(),
-            heading_rate_rad_per_s: 45_f64.to_radians(),
-            heading_acceleration_rad_per_s2: 120_f64.to_radians(),
-        }
-    }
+/// Limits in the units in which they are entered.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EnteredLimits {
+    /// Largest rotation of a joint to either side of its start angle.
+    pub joint_range_deg: f64,
+    pub joint_rate_deg_per_s: f64,
+    pub joint_acceleration_deg_per_s2: f64,
+    pub speed_m_per_s: f64,
+    pub acceleration_m_per_s2: f64,
+    /// Largest distance from the start: forward or back, to either side, up or down.
+    pub reach_m: [f64; 3],
+    /// Largest rotation about the vertical to either side.
+    pub heading_deg: f64,
+    pub heading_rate_deg_per_s: f64,
+}
 
-    /// The same for the joints of a situation, `range_rad` to either side of their start angles within their stops.
-    pub fn slow_around(situation: &Situation, range_rad: f64) -> Self {
+impl EnteredLimits {
+    /// Limits that suit a small multirotor, or a person with the rig in the hand.
+    pub const SLOW: Self = Self {
+        joint_range_deg: 60.0,
+        joint_rate_deg_per_s: 60.0,
+        joint_acceleration_deg_per_s2: 180.0,
+        speed_m_per_s: 1.5,
+        acceleration_m_per_s2: 3.0,
+        reach_m: [1.5, 1.5, 1.0],
+        heading_deg: 60.0,
+        heading_rate_deg_per_s: 45.0,
+    };
+
+    /// Limits for the joints of a situation, which also keep within their stops.
+    pub fn around(&self, situation: &Situation) -> MotionLimits {
+        let range_rad = self.joint_range_deg.to_radians();
         let joints = situation.joints.iter().zip(&situation.joints_rad);
         let ranges = joints.map(|(joint, start_rad)| {
             let (low, high) = joint.limits_rad;
             (low.max(start_rad - range_rad), high.min(start_rad + range_rad))
         });
-        Self::slow(ranges.collect())
+        self.of_joints(ranges.collect())
     }
 
+    /// Limits for joints with these ranges.
+    pub fn of_joints(&self, joints_rad: Vec<(f64, f64)>) -> MotionLimits {
+        MotionLimits {
+            joints_rad,
+            joint_rate_rad_per_s: self.joint_rate_deg_per_s.to_radians(),
+            joint_acceleration_rad_per_s2: self.joint_acceleration_deg_per_s2.to_radians(),
+            speed_m_per_s: self.speed_m_per_s,
+            acceleration_m_per_s2: self.acceleration_m_per_s2,
+            reach_m: self.reach_m.into(),
+            heading_rad: self.heading_deg.to_radians(),
+            heading_rate_rad_per_s: self.heading_rate_deg_per_s.to_radians(),
+            heading_acceleration_rad_per_s2: HEADING_ACCELERATION_DEG_PER_S2.to_radians(),
+        }
+    }
+}
+
+impl MotionLimits {
     /// These limits, lower by a ratio except the ranges, as a margin for a check at other times.
     pub(super) fn reduced(&self, ratio: f64) -> Self {
         Self {

@@ -22,12 +22,13 @@ mod windows;
 
 pub use by_hand::{HandPlan, HandStep};
 pub use edit::move_point;
-pub use limits::{MotionLimits, ReachedLimit};
+pub use limits::{EnteredLimits, MotionLimits, ReachedLimit};
 pub use objective::PlanCriterion;
 pub use plan::{
-    ListedComparison, MotionPlan, MotionPlanError, PLAN_DURATION_S, PlanOptions, PlanStart, plan_by_hand, plan_motion,
+    ListedComparison, MotionPlan, MotionPlanError, PLAN_DURATION_S, PLAN_SECONDS, PlanOptions, PlanStart, plan_by_hand,
+    plan_motion,
 };
 pub use problem::{MotionPrediction, MotionPredictor, MotionProblem, MotionStart};
 pub use starts::PLAN_KNOT_S;
 pub use summary::{PlanTable, PlannedParameter, SigmaRow};
-pub use windows::scene_distances_m;
+pub use windows::{SCENE_M, scene_distances_m};

@@ -37,6 +37,8 @@ pub struct PlanOptions {
 
 /// Shortest and longest plan, in seconds.
 pub const PLAN_DURATION_S: [f64; 2] = [8.0, 120.0];
+/// Duration of a planned motion if none is given, in seconds.
+pub const PLAN_SECONDS: f64 = 20.0;
 /// Starts that are searched further with fine windows.
 const FINALISTS: usize = 2;
 /// Time between the rows of the predicted σ, in seconds.

@@ -9,8 +9,8 @@ use super::repeated::RepeatedMove;
 use super::search::SearchProblem;
 use super::windows::{WindowLayout, WindowRows, joined, rows_of_interval, rows_of_keyframes, trajectory};
 use super::{
-    MotionLimits, MotionPlan, MotionPlanError, MotionPredictor, MotionProblem, MotionStart, PlanCriterion, PlanOptions,
-    move_point, plan_by_hand, plan_motion, starts,
+    EnteredLimits, MotionLimits, MotionPlan, MotionPlanError, MotionPredictor, MotionProblem, MotionStart,
+    PlanCriterion, PlanOptions, move_point, plan_by_hand, plan_motion, starts,
 };
 use crate::camera::CameraModel;
 use crate::estimator::EstimatorConfig;
@@ -43,7 +43,7 @@ fn options(situation: &Situation, trials: usize) -> PlanOptions {
         duration_s: 8.0,
         criterion: PlanCriterion::Worst,
         parameters: Vec::new(),
-        limits: MotionLimits::slow(situation.joints.iter().map(|joint| joint.limits_rad).collect()),
+        limits: EnteredLimits::SLOW.of_joints(situation.joints.iter().map(|joint| joint.limits_rad).collect()),
         starts: 3,
         trials,
         seed: 5,
@@ -166,7 +166,7 @@ fn moves_by_hand_lower_sigma_step_by_step() {
 #[test]
 fn joined_windows_equal_one_long_window_but_for_the_landmarks_between_them() {
     let situation = situation("yaw-roll-pitch-offset", Some(0.5_f64.to_radians()));
-    let limits = MotionLimits::slow(situation.joints.iter().map(|joint| joint.limits_rad).collect());
+    let limits = EnteredLimits::SLOW.of_joints(situation.joints.iter().map(|joint| joint.limits_rad).collect());
     let motion = starts::random(&situation, &limits, 8.0, &mut SplitMix64::new(1));
     let flight = trajectory(&situation, &motion);
     let layout = WindowLayout::fine(8.0);
@@ -195,7 +195,7 @@ fn joined_windows_equal_one_long_window_but_for_the_landmarks_between_them() {
 /// Problem of 8 s with its limits, and waves.
 fn waves(situation: &Situation) -> (MotionProblem, MotionLimits, MotionSplines) {
     let problem = MotionProblem::new(situation.clone(), 8.0).unwrap();
-    let limits = MotionLimits::slow(situation.joints.iter().map(|joint| joint.limits_rad).collect());
+    let limits = EnteredLimits::SLOW.of_joints(situation.joints.iter().map(|joint| joint.limits_rad).collect());
     let motion = problem.start(MotionStart::Waves, &limits, 8.0);
     (problem, limits, motion)
 }
@@ -282,7 +282,7 @@ fn parameters_that_a_parameterization_has_twice_are_called_redundant() {
     let verdicts = |form: Parameterization| {
         let situation = situation_in(form, "yaw-roll-pitch-offset", Some(0.5_f64.to_radians()));
         let problem = MotionProblem::new(situation.clone(), 8.0).unwrap();
-        let limits = MotionLimits::slow(situation.joints.iter().map(|joint| joint.limits_rad).collect());
+        let limits = EnteredLimits::SLOW.of_joints(situation.joints.iter().map(|joint| joint.limits_rad).collect());
         let rest = problem.start(MotionStart::AtRest, &limits, 8.0);
         let table = MotionPredictor::default().predict(&problem, &rest).unwrap().motion;
         let count = |verdict| table.parameters.iter().filter(|parameter| parameter.verdict == verdict).count();

@@ -26,6 +26,9 @@ const FEATURES: usize = 150;
 /// Largest number of keyframes in a window: with more, evenly chosen ones stand for all.
 const MAX_KEYFRAMES: usize = 32;
 
+/// Nearest and farthest distance of the scene that is assumed if nothing is known about it, in metres.
+pub const SCENE_M: [f64; 2] = [4.0, 12.0];
+
 /// Distances of an assumed scene from its nearest to its farthest point, in equal ratios.
 pub fn scene_distances_m([near_m, far_m]: [f64; 2]) -> Vec<f64> {
     const DISTANCES: usize = 7;
