@@ -47,15 +47,8 @@ impl<'a> PrescribedFlight<'a> {
     /// If the vehicle cannot fly it.
     pub(super) fn trajectory(&self, start: &FlightPoint) -> Result<Trajectory, SimulationError> {
         let trajectory = self.splines.trajectory(start.position_m, start.heading_rad, gravity_m_per_s2());
-        let limits = VehicleLimits::default();
-        limits.admit_flight(&trajectory).map_err(|time_s| SimulationError::Motion {
-            problem: format!(
-                "at {time_s:.2} s the vehicle would exceed {:.0} m/s, a tilt of {:.0}°, a rate of {:.0}°/s or its thrust",
-                limits.speed_m_per_s,
-                limits.tilt_rad.to_degrees(),
-                limits.rate_rad_per_s.to_degrees()
-            ),
-        })?;
+        let admitted = VehicleLimits::default().admit_flight(&trajectory);
+        admitted.map_err(|problem| SimulationError::Motion { problem })?;
         Ok(trajectory)
     }
 

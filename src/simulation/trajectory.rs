@@ -250,21 +250,43 @@ impl VehicleLimits {
     /// Checks a flight every 0.02 s.
     ///
     /// # Errors
-    /// The first time in seconds at which the flight exceeds the limits.
-    pub(super) fn admit_flight(&self, trajectory: &Trajectory) -> Result<(), f64> {
+    /// The first time at which the flight exceeds a limit, with the value there.
+    pub(super) fn admit_flight(&self, trajectory: &Trajectory) -> Result<(), String> {
         let steps = (trajectory.duration_s / CHECK_STEP_S).floor() as usize;
         let mut times_s = (0..=steps).map(|step| step as f64 * CHECK_STEP_S);
-        times_s.find(|time_s| !self.admit(&trajectory.at(*time_s))).map_or(Ok(()), Err)
+        let exceeded = |time_s: f64| {
+            let value = self.exceeded(&trajectory.at(time_s))?;
+            Some(format!("at {time_s:.2} s the vehicle would need {value}"))
+        };
+        times_s.find_map(exceeded).map_or(Ok(()), Err)
     }
 
     /// True if the state is within the limits.
     pub fn admit(&self, state: &Kinematics) -> bool {
+        self.exceeded(state).is_none()
+    }
+
+    /// Value of a state beyond its limit, in words.
+    fn exceeded(&self, state: &Kinematics) -> Option<String> {
         let thrust = state.specific_force_m_per_s2.z;
         let upright = (state.world_from_imu.rotation * Vector3::z()).z;
-        upright >= self.tilt_rad.cos()
-            && thrust >= self.min_thrust_m_per_s2
-            && thrust <= self.largest_thrust_m_per_s2
-            && state.angular_velocity_rad_per_s.amax() <= self.rate_rad_per_s
-            && state.velocity_m_per_s.norm() <= self.speed_m_per_s
+        let rate_rad_per_s = state.angular_velocity_rad_per_s.amax();
+        let speed = state.velocity_m_per_s.norm();
+        let is_upright = upright >= self.tilt_rad.cos();
+        if !is_upright {
+            let tilt_deg = upright.clamp(-1.0, 1.0).acos().to_degrees();
+            return Some(format!("a tilt of {tilt_deg:.0}° (at most {:.0}°)", self.tilt_rad.to_degrees()));
+        }
+        let (least, largest) = (self.min_thrust_m_per_s2, self.largest_thrust_m_per_s2);
+        if !(least..=largest).contains(&thrust) {
+            return Some(format!("a thrust of {thrust:.1} m/s² ({least:.1} to {largest:.1} m/s²)"));
+        }
+        let turns_slowly = rate_rad_per_s <= self.rate_rad_per_s;
+        if !turns_slowly {
+            let [rate, largest] = [rate_rad_per_s, self.rate_rad_per_s].map(f64::to_degrees);
+            return Some(format!("an angular rate of {rate:.0}°/s (at most {largest:.0}°/s)"));
+        }
+        let is_slow = speed <= self.speed_m_per_s;
+        (!is_slow).then(|| format!("a speed of {speed:.1} m/s (at most {:.1} m/s)", self.speed_m_per_s))
     }
 }
