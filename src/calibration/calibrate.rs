@@ -326,7 +326,7 @@ fn posterior(result: &StageResult, prior: &BorderTerm) -> CalibrationPosterior {
 }
 
 fn parameters(prior: &ChainTerm, chain: &Chain, sigma: &dyn Fn(usize) -> f64) -> Vec<CalibratedParameter> {
-    let (initial, values) = (prior.given.values(), chain.values());
+    let (initial, values) = (prior.given.values(), chain.values_from(&prior.given));
     chain
         .parameters()
         .into_iter()

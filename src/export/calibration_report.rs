@@ -178,8 +178,9 @@ fn time_shift(run: &CalibrationRun, key: &str, (change_s, sigma_s): (f64, f64)) 
 
 fn chain_parameters(run: &CalibrationRun, outcome: &CalibrationOutcome) -> Vec<ParameterReport> {
     let ground_truth = run.ground_truth_rig.as_ref().and_then(|rig| {
-        let chain = Chain::from_classical(&rig.gimbal.as_ref()?.chain, outcome.parameterization);
-        (chain.dof() == outcome.parameters.len()).then(|| chain.values())
+        let chain_of = |rig: &Rig| Some(Chain::from_classical(&rig.gimbal.as_ref()?.chain, outcome.parameterization));
+        let (chain, given) = (chain_of(rig)?, chain_of(&run.given_rig)?);
+        (chain.dof() == outcome.parameters.len()).then(|| chain.values_from(&given))
     });
     let names = run.given_rig.parameter_names();
     outcome

@@ -201,6 +201,23 @@ impl Chain {
         DVector::from_vec(values)
     }
 
+    /// Value of each column relative to another chain in this parameterization: in `poe` the values of `origin` plus the
+    /// difference from it, otherwise [`Chain::values`].
+    ///
+    /// The inner blocks of `poe` are determined up to screws along joint axes that cancel between neighbouring blocks, so
+    /// that the values of two chains can be compared only if both are relative to the same one.
+    ///
+    /// # Panics
+    ///
+    /// When the numbers of joints differ.
+    pub fn values_from(&self, origin: &Self) -> DVector<f64> {
+        if self.parameterization == Parameterization::Poe {
+            origin.values() + self.minus(origin)
+        } else {
+            self.values()
+        }
+    }
+
     /// Returns the canonical one of all chains of the same mechanism: middle angles of base and end within ±π/2, twists
     /// of the middle links within 0 to π, offsets and other rotations within ±π. Parameterizations that are not minimal
     /// return unchanged.

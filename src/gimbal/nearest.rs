@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::geometry::dense;
 
-use super::{Chain, Parameterization, generic_joint_angles, stacked_jacobian};
+use super::{Chain, ParameterId, Parameterization, generic_joint_angles, stacked_jacobian};
 
 /// Number of joint angles per joint at which two chains are compared.
 const ANGLES_PER_JOINT: usize = 4;
@@ -38,6 +38,12 @@ impl NearestForm {
         let classical = near.parameterization() == Parameterization::Classical && scales.len() == near.dof();
         let inverse = if classical { shortest(&near, &angles, scales) } else { DMatrix::zeros(0, 0) };
         Self { near, angles, inverse }
+    }
+
+    /// Parameters with the values of a mechanism, in `poe` relative to the given ones.
+    pub fn values_of(&self, mechanism: &Chain) -> Vec<(ParameterId, f64)> {
+        let chain = self.of(mechanism);
+        chain.parameters().into_iter().zip(chain.values_from(&self.near).iter().copied()).collect()
     }
 
     /// Converts a mechanism; without convergence near the given values, returns the plain conversion.

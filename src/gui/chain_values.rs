@@ -11,8 +11,8 @@ pub(crate) type ParameterValues = BTreeMap<ParameterId, f64>;
 
 /// The values of a chain in a parameterization.
 pub(crate) fn parameter_values(classical: &ClassicalChain, conversion: &NearestForm) -> ParameterValues {
-    let chain = conversion.of(&Chain::from_classical(classical, Parameterization::Classical));
-    principal_values(&chain.parameters(), chain.values().as_slice())
+    let values = conversion.values_of(&Chain::from_classical(classical, Parameterization::Classical));
+    values.into_iter().map(|(parameter, value)| (parameter, parameter.principal_value(value))).collect()
 }
 
 /// Values by parameter, angles in (−π, π].

@@ -81,7 +81,7 @@ fn table(
     let covariance = transport_covariance(&fit.state.chain, &chain_covariance(fit), &chain);
     let jackknife = jackknife.map(|it| jackknife_sigmas(&(transport(&fit.state.chain, &chain) * &it.chain)));
     let names = stills.parameter_names();
-    let (before, values) = (initial.values(), chain.values());
+    let (before, values) = (initial.values(), chain.values_from(&initial));
     let parameters = chain.parameters().into_iter().enumerate().map(|(place, id)| {
         let formal = covariance[(place, place)].max(0.0).sqrt();
         let sigma_jackknife = jackknife.as_ref().map(|sigmas| sigmas[place]);

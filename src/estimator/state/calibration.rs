@@ -133,8 +133,8 @@ impl Calibration {
             return self;
         }
         let offsets = !self.chain().hides_joint_offsets();
-        let chain = GivenChain::form(&found.chain, found.parameterization, offsets);
-        let before = Arc::new(self.given.in_parameterization(found.parameterization, offsets));
+        let chain = if offsets { found.chain.clone() } else { found.chain.clone().without_joint_offsets() };
+        let before = Arc::new(self.given.in_parameterization(chain.parameterization(), offsets));
         // Columns that the earlier pass or flight did not estimate keep the rig's prior.
         let columns = chain.dof();
         let place_of = |column: &SensorColumn| {
@@ -154,7 +154,7 @@ impl Calibration {
         let earlier = EarlierPrior { measurements, covariance, expected: expected.clone(), before };
         Self {
             values: Values { chain: chain.clone(), sensors: expected },
-            given: Arc::new(GivenChain::of_earlier_pass(&found.chain, chain, earlier)),
+            given: Arc::new(GivenChain::of_earlier_pass(&found.chain.to_classical(), chain, earlier)),
             ..self
         }
     }
@@ -180,8 +180,7 @@ impl Calibration {
         };
         let sensors = self.sensors.iter().zip(self.values.sensors.iter());
         Some(FoundCamera {
-            chain: self.chain().to_classical(),
-            parameterization: self.chain().parameterization(),
+            chain: self.chain().clone(),
             covariance: carried,
             sensors: sensors.map(|(column, change)| (column.parameter, *change)).collect(),
         })
@@ -309,11 +308,12 @@ impl Calibration {
         parameters
     }
 
-    /// Values of all columns; the camera's time offset as Kalibr's `timeshift_cam_imu`.
+    /// Values of all columns, in `poe` relative to the rig's ([`Chain::values_from`]); the camera's time offset as Kalibr's
+    /// `timeshift_cam_imu`.
     pub(crate) fn values(&self) -> Vec<f64> {
         let sensors = self.values.sensors.iter().zip(self.sensors.iter());
         let sensors = sensors.map(|(change, column)| column.given + change);
-        self.chain().values().iter().copied().chain(sensors).collect()
+        self.chain().values_from(&self.given.rig().chain).iter().copied().chain(sensors).collect()
     }
 
     /// Fixes a parameter at its current value.

@@ -83,8 +83,7 @@ impl CalibrationPosterior {
         let block = self.covariance.view_range(columns.clone(), columns);
         let sensors = kept.iter().filter(|place| **place >= one.chain_columns());
         FoundCamera {
-            chain: one.chain.clone(),
-            parameterization: one.parameterization,
+            chain: Chain::from_classical(&one.chain, one.parameterization),
             covariance: block.select_rows(&kept).select_columns(&kept),
             sensors: sensors.map(|place| (one.parameters[*place], one.values[*place])).collect(),
         }

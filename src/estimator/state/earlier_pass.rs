@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, Vector3};
 
 use super::navigation::ImuBias;
-use crate::gimbal::{ClassicalChain, ParameterId, Parameterization};
+use crate::gimbal::{Chain, ParameterId};
 
 /// Result of a pass over the measurements, as prior of the next pass.
 #[derive(Clone, Debug)]
@@ -17,8 +17,8 @@ pub struct EarlierPass {
 /// Calibration of one camera at the end of a pass.
 #[derive(Clone, Debug)]
 pub(crate) struct FoundCamera {
-    pub(crate) chain: ClassicalChain,
-    pub(crate) parameterization: Parameterization,
+    /// Chain with the columns of the covariance.
+    pub(crate) chain: Chain,
     /// Prior covariance of all columns.
     pub(crate) covariance: DMatrix<f64>,
     /// Estimated time offsets, shutter and intrinsics, relative to the rig's values.

@@ -1,5 +1,7 @@
 use std::f64::consts::FRAC_PI_2;
 
+use nalgebra::DVector;
+
 use super::random::{Random, all_chains, special_chains};
 use crate::geometry::RigidTransform;
 use crate::gimbal::{
@@ -220,5 +222,23 @@ fn canonical_numbers_do_not_depend_on_how_the_chain_was_written() {
                 }
             }
         }
+    }
+}
+
+#[test]
+fn values_of_poe_from_one_origin_do_not_depend_on_how_they_were_reached() {
+    let mut random = Random::new(11);
+    for joints in 1..=5 {
+        let origin = Chain::from_classical(&random.chain(joints), Parameterization::Poe);
+        let step = DVector::from_fn(origin.dof(), |_, _| random.within(0.3));
+        let at_once = origin.plus(&step);
+        let values = at_once.values_from(&origin);
+        assert!((&values - origin.values() - &step).amax() < 1e-9, "{joints} joints");
+        // The same mechanism, written anew: screws along the axes have moved between its blocks.
+        let anew = Chain::from_classical(&at_once.to_classical(), Parameterization::Poe);
+        assert!((&values - anew.values_from(&origin)).amax() < 1e-9, "{joints} joints");
+        assert!(joints == 1 || (anew.values() - at_once.values()).amax() > 1e-3, "{joints} joints");
+        let minimal = origin.in_parameterization(Parameterization::Minimal);
+        assert_eq!(minimal.values_from(&minimal), minimal.values());
     }
 }

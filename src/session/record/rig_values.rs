@@ -17,8 +17,7 @@ impl RunRecord {
     pub fn values_in(&self, rig: &Rig, given: &Rig, estimate: &CalibrationEstimate) -> Option<Vec<(ParameterId, f64)>> {
         let main = rig.chain_of_camera(&self.camera_key)?;
         let conversion = self.conversion_for(given, estimate, estimate.parameterization)?;
-        let chain = conversion.of(&Chain::from_classical(&main, Parameterization::Classical));
-        let mut values: Vec<_> = chain.parameters().into_iter().zip(chain.values().iter().copied()).collect();
+        let mut values = conversion.values_of(&Chain::from_classical(&main, Parameterization::Classical));
         for (camera, (key, _)) in (1..).zip(&estimate.rigid_cameras) {
             values.extend(rigid_columns(camera, &rig.chain_of_camera(key)?.imu_from_camera(&[])));
         }
