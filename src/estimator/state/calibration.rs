@@ -12,6 +12,7 @@ use super::earlier_pass::FoundCamera;
 use super::given_chain::{EarlierPrior, GivenChain, GivenSigmas, PriorMeasurements};
 use super::sensor_columns::SensorColumn;
 use crate::camera::CameraModel;
+use crate::estimator::config::INACCURATE_ROTATION_RAD;
 use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::{
     Chain, ChainLinearization, ClassicalChain, ParameterId, ParameterPart, Parameterization, Quantity, transport,
@@ -444,10 +445,10 @@ impl Calibration {
         jacobian
     }
 
-    /// Standard deviation of the rotations of the given chain, in radians; 0 if the chain is not calibrated or comes
-    /// from an earlier pass.
-    pub(crate) fn given_rotation_sigma_rad(&self) -> f64 {
-        if self.free { self.given.rotation_sigma_rad() } else { 0.0 }
+    /// True if rotations of the given chain have a standard deviation above [`INACCURATE_ROTATION_RAD`]; false if the chain
+    /// is not calibrated, or comes from a flight or an earlier pass.
+    pub(crate) fn has_inaccurate_rotations(&self) -> bool {
+        self.free && self.given.rotation_sigma_rad() > INACCURATE_ROTATION_RAD
     }
 
     /// Standard deviation of each column under the rig's prior.

@@ -10,6 +10,7 @@ mod flight;
 mod gain;
 mod gimbal_imu;
 mod jacobian;
+mod keyframes;
 mod packed;
 mod preintegration;
 mod sensors;

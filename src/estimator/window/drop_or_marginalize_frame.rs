@@ -13,15 +13,10 @@ use crate::optimization::LandmarkModel;
 /// Limit of marginalized frames per image: a window above its size shrinks by one frame per keyframe.
 const MAX_MARGINALIZED_AT_ONCE: usize = 2;
 
-/// Standard deviation of the given chain rotations above which they are inaccurate, in radians: derivatives at the
-/// given chain have a relative error of the same size.
-const INACCURATE_ROTATION_RAD: f64 = 0.03;
-
 /// Number of frames in the first window, before marginalization. It is larger than later windows: marginalization fixes
 /// linearization points, so the chain of the leading camera must be close to its true values first.
 pub(crate) fn first_window_frames(calibration: &Calibrations, options: &EstimatorOptions) -> usize {
-    let given_sigma_rad = calibration.of(calibration.leading()).given_rotation_sigma_rad();
-    let inaccurate = given_sigma_rad > INACCURATE_ROTATION_RAD;
+    let inaccurate = calibration.of(calibration.leading()).has_inaccurate_rotations();
     let factor = if inaccurate { options.inaccurate_first_window_factor } else { options.first_window_factor };
     options.window * usize::from(factor)
 }

@@ -3,6 +3,7 @@
 use super::features;
 use super::setup::Setup;
 use super::window_state::WindowState;
+use crate::estimator::config::{KEYFRAME_JOINT_INTERVAL_S, KEYFRAME_JOINT_RAD};
 use crate::estimator::report::{Event, EventKind};
 use crate::estimator::state::calibrations::MAIN;
 use crate::geometry::seconds_from_ns;
@@ -57,8 +58,28 @@ impl WindowState {
         if decisions.is_empty() {
             return self.keyframe_by_image(setup, MAIN, last, 0);
         }
+        decisions.extend(self.keyframe_by_joints(last));
         let first = decisions.iter().position(|decision| decision.keyframe).unwrap_or(0);
         decisions.swap_remove(first)
+    }
+
+    /// Keyframe for joints that have moved since the last keyframe, with a chain whose rotations are given inaccurately.
+    fn keyframe_by_joints(&self, last: usize) -> Option<Decision> {
+        let (newest, before) = (self.frames.newest(), &self.frames[last]);
+        let age_s = seconds_from_ns(newest.stamp_ns - before.stamp_ns);
+        let is_inaccurate = self.calibration.of(self.calibration.leading()).has_inaccurate_rotations();
+        if !is_inaccurate || age_s < KEYFRAME_JOINT_INTERVAL_S {
+            return None;
+        }
+        let joints_rad = newest.state.joints_rad.iter().zip(&before.state.joints_rad);
+        let moved_rad = joints_rad.map(|(now, then)| (now - then).abs()).fold(0.0, f64::max);
+        (moved_rad >= KEYFRAME_JOINT_RAD).then(|| {
+            let [moved_deg, limit_deg] = [moved_rad, KEYFRAME_JOINT_RAD].map(f64::to_degrees);
+            let message = format!(
+                "keyframe: a joint has moved by {moved_deg:.1}° since the last keyframe (threshold {limit_deg:.1}°)"
+            );
+            Decision::new(true, message, moved_rad, KEYFRAME_JOINT_RAD)
+        })
     }
 
     /// Keyframe decision of one camera from its features in common with the last keyframe; `observed` is the number of

@@ -6,7 +6,11 @@ use super::mechanism::LaboratoryJoint;
 use super::motion::middle_angle_rad;
 use super::{FRAME_PERIOD_S, LaboratoryForm, LaboratorySetup};
 use crate::camera::CameraModel;
-use crate::estimator::{EstimatorConfig, JointKnowledge, NavigationState, PoseKnowledge, StepReport, gravity_in_world};
+use crate::estimator::{
+    EstimatorConfig, INACCURATE_ROTATION_RAD, JointKnowledge, NavigationState, PoseKnowledge, StepReport,
+    gravity_in_world,
+};
+use crate::geometry::Dimension;
 use crate::gimbal::{Chain, ParameterNames};
 use crate::observability::{RankReport, analyse, chain_of_step};
 use crate::sensors::{ImuNoise, Rig};
@@ -167,6 +171,17 @@ impl Situation {
     /// True if the joint angles are estimated without encoder readings.
     pub(super) fn joints_free(&self) -> bool {
         self.encoders == JointKnowledge::Unknown && self.chain.joint_count() > 0
+    }
+
+    /// True if the chain is known so inaccurately that the estimator makes keyframes by the motion of joints.
+    pub(super) fn has_inaccurate_rotations(&self) -> bool {
+        let Some(covariance) = self.information.clone().cholesky().map(|information| information.inverse()) else {
+            return true;
+        };
+        self.chain.parameters().iter().enumerate().any(|(column, parameter)| {
+            let sigma = covariance[(column, column)].sqrt() * parameter.scale();
+            parameter.dimension() == Dimension::Angle && sigma > INACCURATE_ROTATION_RAD
+        })
     }
 
     /// One unit of each column: 10° or 3 cm.

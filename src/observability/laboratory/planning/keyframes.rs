@@ -3,7 +3,7 @@
 use nalgebra::{Vector2, Vector3};
 
 use super::super::Situation;
-use crate::estimator::EstimatorOptions;
+use crate::estimator::{EstimatorOptions, KEYFRAME_JOINT_INTERVAL_S, KEYFRAME_JOINT_RAD};
 use crate::geometry::RigidTransform;
 use crate::simulation::{MotionSplines, Trajectory};
 
@@ -14,8 +14,8 @@ const MIN_PERIOD_S: f64 = 0.05;
 
 /// Times of the keyframes from the start of an interval on, before its end; the first one is at the start.
 ///
-/// An image becomes a keyframe if the points of the last one have enough parallax, rotation compensated, or if too few
-/// of them are still in the image.
+/// An image becomes a keyframe if the points of the last one have enough parallax, rotation compensated, if too few of
+/// them are still in the image, or if a joint has moved and rotations of the chain are inaccurate.
 pub(super) fn keyframe_times_s(
     situation: &Situation,
     motion: &MotionSplines,
@@ -31,12 +31,18 @@ pub(super) fn keyframe_times_s(
     let images = ((to_s - from_s) / period_s - 1e-6).ceil().max(1.0) as usize;
     let mut times_s = vec![from_s];
     let mut last = pose(from_s);
+    let is_inaccurate = situation.has_inaccurate_rotations();
     for image in 1..images {
         let time_s = from_s + image as f64 * period_s;
         let newest = pose(time_s);
         let (parallax_rad, common) = compare(situation, &points, &(newest.inverse() * last));
         let new_ratio = 1.0 - common as f64 / points.len().max(1) as f64;
-        if new_ratio > options.keyframe_new_ratio || parallax_rad >= options.keyframe_parallax_rad {
+        let last_s = times_s.last().copied().unwrap_or(from_s);
+        let moved_rad = |joint: usize| (motion.value(joint, time_s, 0) - motion.value(joint, last_s, 0)).abs();
+        let by_joints = is_inaccurate
+            && time_s - last_s >= KEYFRAME_JOINT_INTERVAL_S - 1e-6
+            && (0..motion.joint_count()).any(|joint| moved_rad(joint) >= KEYFRAME_JOINT_RAD);
+        if by_joints || new_ratio > options.keyframe_new_ratio || parallax_rad >= options.keyframe_parallax_rad {
             times_s.push(time_s);
             last = newest;
         }

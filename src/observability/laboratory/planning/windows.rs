@@ -24,7 +24,7 @@ const IMU_RATE_HZ: f64 = 50.0;
 /// Features that the front end keeps in an image.
 const FEATURES: usize = 150;
 /// Largest number of keyframes in a window: with more, evenly chosen ones stand for all.
-const MAX_KEYFRAMES: usize = 32;
+const MAX_KEYFRAMES: usize = 48;
 
 /// Nearest and farthest distance of the scene that is assumed if nothing is known about it, in metres.
 pub const SCENE_M: [f64; 2] = [4.0, 12.0];

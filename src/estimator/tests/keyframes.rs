@@ -1,0 +1,48 @@
+//! Selection of keyframes.
+
+use super::fixture;
+use super::flight::step;
+use crate::estimator::Estimator;
+use crate::estimator::config::{EstimatorOptions, KEYFRAME_JOINT_INTERVAL_S};
+use crate::estimator::report::EventKind;
+use crate::geometry::seconds_from_ns;
+use crate::gimbal::Parameterization;
+use crate::sensors::ChainPrior;
+use crate::simulation::{Exercise, JointSwing, SyntheticMotion, SyntheticOptions, VehicleSwing, synthetic_tracks};
+
+#[test]
+fn moving_joints_make_keyframes_where_rotations_of_the_chain_are_inaccurate() {
+    // A hovering vehicle, whose images have no parallax; after 4.5 s a joint swings by 15°, until the IMU is found to be
+    // stationary.
+    let swing = JointSwing { joint: 0, amplitude_rad: 15_f64.to_radians() };
+    let of_rotations = |rotation_bound_rad: f64| {
+        let flight = synthetic_tracks(&SyntheticOptions {
+            duration_s: 12.0,
+            features: 80,
+            motion: SyntheticMotion::Hover,
+            look_around_rad: 0.3,
+            exercise: Some((4.5, Exercise::full(VehicleSwing::Hover, Some(swing)))),
+            start_error: ChainPrior { translation_bound_m: 0.01, rotation_bound_rad },
+            ..SyntheticOptions::default()
+        });
+        let config = fixture::config(&flight.given_rig, Parameterization::Minimal, EstimatorOptions::default());
+        let mut estimator = Estimator::new(config);
+        let (mut by_joints, mut newest) = (Vec::new(), 0.0);
+        for frame in &flight.frames {
+            let report = step(&mut estimator, frame);
+            let time_s = seconds_from_ns(frame.stamp_ns);
+            let chosen = report.events.iter().find(|event| event.kind == EventKind::KeyframeChosen);
+            if let Some(event) = chosen.filter(|_| report.keyframe) {
+                if event.message.contains("a joint has moved") {
+                    by_joints.push(time_s - newest);
+                }
+                newest = time_s;
+            }
+        }
+        by_joints
+    };
+    let by_joints = of_rotations(5_f64.to_radians());
+    assert!(by_joints.len() >= 4, "{by_joints:?}");
+    assert!(by_joints.iter().all(|since_s| *since_s >= KEYFRAME_JOINT_INTERVAL_S - 1e-6), "{by_joints:?}");
+    assert!(of_rotations(0.5_f64.to_radians()).is_empty());
+}
