@@ -6,7 +6,8 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::moves::{HandMove, combined};
+use super::admitted::combined;
+use super::moves::HandMove;
 use super::search::SearchProblem;
 use super::starts;
 use super::summary::{PlanTable, SigmaRow};

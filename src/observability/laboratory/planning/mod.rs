@@ -4,6 +4,7 @@
 //! Its information is that of consecutive windows with the keyframes that the estimator makes of it, each linearized by
 //! the factors of the estimator. The search adds bumps to the splines within the limits of joints and vehicle.
 
+mod admitted;
 mod by_hand;
 mod edit;
 mod keyframes;

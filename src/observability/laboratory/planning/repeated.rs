@@ -3,7 +3,8 @@
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::moves::{HandMove, listed};
+use super::admitted::listed;
+use super::moves::HandMove;
 use super::search::SearchProblem;
 use super::starts;
 use crate::simulation::MotionSplines;
