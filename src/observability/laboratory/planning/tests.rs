@@ -179,7 +179,8 @@ fn joined_windows_equal_one_long_window_but_for_the_landmarks_between_them() {
     let objective = Objective::new(&situation, PlanCriterion::Worst, &[]).unwrap();
     let sigmas = |information: &DMatrix<f64>| objective.sigmas(information).unwrap().1;
     let excess = |some: &[f64], all: &[f64]| -> Vec<f64> { some.iter().zip(all).map(|(a, b)| a / b - 1.0).collect() };
-    let long = rows_of_keyframes(&situation, &motion, &flight, (&times_s, 8.0), layout.features).unwrap();
+    let images = 8.0 / situation.image_period_s / times_s.len() as f64;
+    let long = rows_of_keyframes(&situation, &motion, &flight, (&times_s, 8.0), (layout.features, images)).unwrap();
     let long = sigmas(&joined([&long], columns));
     let of_joined = excess(&sigmas(&joined(&windows, columns)), &long);
     assert!(of_joined.iter().all(|excess| (-0.1..0.4).contains(excess)), "{of_joined:.3?}");

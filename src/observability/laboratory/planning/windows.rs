@@ -100,17 +100,16 @@ pub(super) struct WindowRows {
 const MOTION: usize = 15;
 
 /// Rows of an interval with keyframes at these times, the first one at its start; the motion at its end is measured by
-/// the IMU alone. `None` when a number is not finite.
+/// the IMU alone. `images` is the number of images for each keyframe. `None` when a number is not finite.
 pub(super) fn rows_of_keyframes(
     situation: &Situation,
     motion: &MotionSplines,
     trajectory: &Trajectory,
     (times_s, end_s): (&[f64], f64),
-    features: usize,
+    (features, images): (usize, f64),
 ) -> Option<WindowRows> {
     let frames = frames(situation, motion, trajectory, &[times_s, &[end_s]].concat());
     // Readings at images that do not become keyframes are carried to the next one.
-    let images = (end_s - times_s[0]) / situation.image_period_s / times_s.len() as f64;
     let joints = match situation.encoders {
         JointKnowledge::Encoder(sigma_rad) => JointKnowledge::Encoder(sigma_rad / images.max(1.0).sqrt()),
         other => other,
@@ -122,16 +121,20 @@ pub(super) fn rows_of_keyframes(
     Some(WindowRows { rows: measured_rows(&linearization, &kept)? })
 }
 
-/// Rows of an interval with the keyframes that the estimator makes in it.
+/// Rows from the start of a window to a time in it, with the keyframes that the estimator makes. The noise of the readings
+/// at a keyframe is that of the whole window, so that more of a window never measures less.
 pub(super) fn rows_of_interval(
     situation: &Situation,
     motion: &MotionSplines,
     trajectory: &Trajectory,
     layout: &WindowLayout,
-    interval_s: [f64; 2],
+    [from_s, to_s]: [f64; 2],
 ) -> Option<WindowRows> {
-    let times_s = layout.used(keyframe_times_s(situation, motion, trajectory, interval_s));
-    rows_of_keyframes(situation, motion, trajectory, (&times_s, interval_s[1]), layout.features)
+    let whole_s = layout.interval_s((from_s / layout.length_s).round() as usize);
+    let all_s = layout.used(keyframe_times_s(situation, motion, trajectory, whole_s));
+    let images = layout.length_s / situation.image_period_s / all_s.len() as f64;
+    let times_s: Vec<f64> = all_s.into_iter().filter(|time_s| *time_s < to_s - 1e-9).collect();
+    rows_of_keyframes(situation, motion, trajectory, (&times_s, to_s), (layout.features, images))
 }
 
 /// Rows of a whole window.
