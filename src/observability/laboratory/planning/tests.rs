@@ -77,7 +77,7 @@ fn a_planned_motion_beats_the_listed_ones_within_the_limits_on_any_number_of_thr
     assert!(planned.limits.iter().all(super::ReachedLimit::is_kept), "{planned}");
     // Limits of a motion that is as fast as allowed are tight.
     assert!(planned.limits.iter().any(|limit| limit.reached > 0.7 * limit.limit), "{planned}");
-    // σ starts at the prior, ends at the plan's and never grows by more than the landmarks of a new window.
+    // σ starts at the prior, ends at the plan's and never grows.
     let (first, last) = (planned.sigmas.first().unwrap(), planned.sigmas.last().unwrap());
     assert_eq!((first.time_s, last.time_s), (0.0, 8.0));
     assert!(first.sigmas.iter().all(|(_, ratio)| (ratio - 1.0).abs() < 1e-9));
@@ -86,7 +86,7 @@ fn a_planned_motion_beats_the_listed_ones_within_the_limits_on_any_number_of_thr
     }
     for pair in planned.sigmas.windows(2) {
         for ((before, _), (after, _)) in pair[0].sigmas.iter().zip(&pair[1].sigmas) {
-            assert!(after <= &(before * 1.1), "{before} {after} at {}", pair[1].time_s);
+            assert!(after <= &(before * (1.0 + 1e-6)), "{before} {after} at {}", pair[1].time_s);
         }
     }
 }

@@ -24,7 +24,7 @@ const IMU_RATE_HZ: f64 = 50.0;
 /// Features that the front end keeps in an image.
 const FEATURES: usize = 150;
 /// Largest number of keyframes in a window: with more, evenly chosen ones stand for all.
-const MAX_KEYFRAMES: usize = 48;
+const MAX_KEYFRAMES: usize = 32;
 
 /// Nearest and farthest distance of the scene that is assumed if nothing is known about it, in metres.
 pub const SCENE_M: [f64; 2] = [4.0, 12.0];
@@ -96,8 +96,10 @@ pub(super) struct WindowRows {
     rows: DMatrix<f64>,
 }
 
-/// Columns of the motion of the IMU at one time.
+/// Columns of the motion of the IMU at one time: rotation, position, velocity, biases.
 const MOTION: usize = 15;
+/// Rotation about the vertical and position at the start of a flight, which nothing measures.
+const UNOBSERVABLE: Range<usize> = 2..6;
 
 /// Rows of an interval with keyframes at these times, the first one at its start; the motion at its end is measured by
 /// the IMU alone. `images` is the number of images for each keyframe. `None` when a number is not finite.
@@ -151,8 +153,12 @@ pub(super) fn rows_of_window(
 /// Information matrix of the calibration (n × n, in column units) from consecutive windows: each starts with what those
 /// before it have measured of the motion of the IMU.
 pub(super) fn joined<'a>(windows: impl IntoIterator<Item = &'a WindowRows>, columns: usize) -> DMatrix<f64> {
-    // Over the motion at the last frame so far and the calibration.
-    let mut carried = DMatrix::zeros(0, MOTION + columns);
+    // Over the motion at the last frame so far and the calibration. Fixing what is unobservable at the start measures
+    // nothing of the calibration; without it, rounding would decide which rows belong to these directions.
+    let mut carried = DMatrix::zeros(UNOBSERVABLE.len(), MOTION + columns);
+    for (row, column) in UNOBSERVABLE.enumerate() {
+        carried[(row, column)] = 1.0;
+    }
     for window in windows {
         let rows = &window.rows;
         let (before, own) = (carried.nrows(), rows.nrows());
