@@ -120,6 +120,11 @@ impl Calibrations {
         self.cameras.iter().position(|calibration| calibration.joint_count() == 0).unwrap_or(MAIN)
     }
 
+    /// True if the leading camera's chain has [inaccurate rotations](Calibration::has_inaccurate_rotations).
+    pub(crate) fn leads_inaccurately(&self) -> bool {
+        self.of(self.leading()).has_inaccurate_rotations()
+    }
+
     /// Parameters of all columns, free or not: chain and sensor columns of the main camera, then the rigid
     /// cameras, then the IMU.
     pub(crate) fn parameters(&self) -> Vec<ParameterId> {

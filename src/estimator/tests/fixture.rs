@@ -28,7 +28,10 @@ use crate::frontend::TrackedFrame;
 use crate::geometry::Dimension;
 use crate::gimbal::{Chain, ParameterId, Parameterization};
 use crate::sensors::{ImuSample, Rig};
-use crate::simulation::{SyntheticFlight, SyntheticFrame, SyntheticMount, SyntheticOptions, synthetic_tracks};
+use crate::simulation::{
+    Exercise, JointSwing, SyntheticFlight, SyntheticFrame, SyntheticMotion, SyntheticMount, SyntheticOptions,
+    VehicleSwing, synthetic_tracks,
+};
 
 pub(super) struct TestWindow {
     pub(super) setup: Setup,
@@ -60,6 +63,19 @@ impl TestWindow {
     /// Current estimate, with the landmarks of these tracks.
     pub(super) fn estimate(&self, active: &[ActiveTracks]) -> Estimate {
         self.window.estimate(active.iter().map(|active| active.landmarks.clone()).collect())
+    }
+}
+
+/// Hover during which one joint swings by 15° from 4.5 s on.
+pub(super) fn joint_swing(joint: usize, duration_s: f64) -> SyntheticOptions {
+    let swing = JointSwing { joint, amplitude_rad: 15_f64.to_radians() };
+    SyntheticOptions {
+        duration_s,
+        features: 80,
+        motion: SyntheticMotion::Hover,
+        look_around_rad: 0.3,
+        exercise: Some((4.5, Exercise::full(VehicleSwing::Hover, Some(swing)))),
+        ..SyntheticOptions::default()
     }
 }
 

@@ -17,7 +17,7 @@ use crate::estimator::window::active_tracks::ActiveTracks;
 use crate::gimbal::Parameterization;
 use crate::gimbal::tests::parameter;
 use crate::optimization::RobustLoss;
-use crate::simulation::{Exercise, JointSwing, SyntheticMotion, SyntheticOptions, VehicleSwing, synthetic_tracks};
+use crate::simulation::synthetic_tracks;
 
 /// Windows with a prior, away from the ground truth.
 fn windows() -> Vec<(&'static str, TestWindow)> {
@@ -146,15 +146,7 @@ fn information_gain_equals_that_of_windows_with_and_without_the_newest_image() {
 #[test]
 fn information_gain_is_attributed_to_the_moving_joint() {
     for joint in 0..3 {
-        let swing = JointSwing { joint, amplitude_rad: 15_f64.to_radians() };
-        let flight = synthetic_tracks(&SyntheticOptions {
-            duration_s: 16.5,
-            features: 80,
-            motion: SyntheticMotion::Hover,
-            look_around_rad: 0.3,
-            exercise: Some((4.5, Exercise::full(VehicleSwing::Hover, Some(swing)))),
-            ..SyntheticOptions::default()
-        });
+        let flight = synthetic_tracks(&fixture::joint_swing(joint, 16.5));
         let config = fixture::config(&flight.given_rig, Parameterization::Minimal, EstimatorOptions::default());
         let mut estimator = Estimator::new(config);
         // Total information of the last second by motion: by then no frame of the window is from before the exercise.

@@ -8,23 +8,15 @@ use crate::estimator::report::EventKind;
 use crate::geometry::seconds_from_ns;
 use crate::gimbal::Parameterization;
 use crate::sensors::ChainPrior;
-use crate::simulation::{Exercise, JointSwing, SyntheticMotion, SyntheticOptions, VehicleSwing, synthetic_tracks};
+use crate::simulation::{SyntheticOptions, synthetic_tracks};
 
 #[test]
 fn moving_joints_make_keyframes_where_rotations_of_the_chain_are_inaccurate() {
     // A hovering vehicle, whose images have no parallax; after 4.5 s a joint swings by 15°, until the IMU is found to be
     // stationary.
-    let swing = JointSwing { joint: 0, amplitude_rad: 15_f64.to_radians() };
     let of_rotations = |rotation_bound_rad: f64| {
-        let flight = synthetic_tracks(&SyntheticOptions {
-            duration_s: 12.0,
-            features: 80,
-            motion: SyntheticMotion::Hover,
-            look_around_rad: 0.3,
-            exercise: Some((4.5, Exercise::full(VehicleSwing::Hover, Some(swing)))),
-            start_error: ChainPrior { translation_bound_m: 0.01, rotation_bound_rad },
-            ..SyntheticOptions::default()
-        });
+        let start_error = ChainPrior { translation_bound_m: 0.01, rotation_bound_rad };
+        let flight = synthetic_tracks(&SyntheticOptions { start_error, ..fixture::joint_swing(0, 12.0) });
         let config = fixture::config(&flight.given_rig, Parameterization::Minimal, EstimatorOptions::default());
         let mut estimator = Estimator::new(config);
         let (mut by_joints, mut newest) = (Vec::new(), 0.0);

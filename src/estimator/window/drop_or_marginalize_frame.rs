@@ -16,7 +16,7 @@ const MAX_MARGINALIZED_AT_ONCE: usize = 2;
 /// Number of frames in the first window, before marginalization. It is larger than later windows: marginalization fixes
 /// linearization points, so the chain of the leading camera must be close to its true values first.
 pub(crate) fn first_window_frames(calibration: &Calibrations, options: &EstimatorOptions) -> usize {
-    let inaccurate = calibration.of(calibration.leading()).has_inaccurate_rotations();
+    let inaccurate = calibration.leads_inaccurately();
     let factor = if inaccurate { options.inaccurate_first_window_factor } else { options.first_window_factor };
     options.window * usize::from(factor)
 }

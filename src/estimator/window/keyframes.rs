@@ -67,8 +67,7 @@ impl WindowState {
     fn keyframe_by_joints(&self, last: usize) -> Option<Decision> {
         let (newest, before) = (self.frames.newest(), &self.frames[last]);
         let age_s = seconds_from_ns(newest.stamp_ns - before.stamp_ns);
-        let is_inaccurate = self.calibration.of(self.calibration.leading()).has_inaccurate_rotations();
-        if !is_inaccurate || age_s < KEYFRAME_JOINT_INTERVAL_S {
+        if !self.calibration.leads_inaccurately() || age_s < KEYFRAME_JOINT_INTERVAL_S {
             return None;
         }
         let joints_rad = newest.state.joints_rad.iter().zip(&before.state.joints_rad);
