@@ -96,7 +96,10 @@ fn motions_beyond_the_vehicle_and_its_gimbal_are_rejected() {
         "it moves yaw, roll, the rig has yaw, roll, pitch",
     );
     check(|_, motion| motion.samples[20].joints_rad[1] = 0.6, "the joint 'roll' is at 34.4°, its range is -25° to 25°");
-    check(|_, motion| motion.samples[20].position_m.x = 30.0, "s the vehicle would need a");
+    check(
+        |_, motion| motion.samples[20].position_m.x = 30.0,
+        "the vehicle would need an angular rate of 168°/s (at most 138°/s)",
+    );
     check(|_, motion| motion.samples[3].time_s = 0.1, "after 0.200 s is 0.100 s");
     check(|options, _| options.disturbances.set("hover=1,1").unwrap(), "the disturbance 'hover'");
 }
