@@ -104,17 +104,23 @@ impl WindowState {
         let estimated = |column: &usize| {
             column.checked_sub(first).is_none_or(|place| known.contains(&parameters[place]) && !frozen.contains(&place))
         };
-        let kept: Vec<usize> = (0..problem.layout.total()).filter(estimated).collect();
+        let mut order = problem.layout.elimination_order();
+        order.retain(estimated);
+        let Some(factor) = Cholesky::ordered(&hessian, order.clone(), |diagonal| diagonal + FLOOR) else {
+            return Vec::new();
+        };
+        let step = -factor.solve(&gradient);
         let tried = parameters.iter().enumerate().filter(|(_, parameter)| !known.contains(parameter));
         let score = |(place, parameter): (usize, &ParameterId)| {
-            let columns: Vec<usize> = kept.iter().copied().chain([first + place]).collect();
-            let mut matrix = hessian.select_columns(&columns).select_rows(&columns);
-            (0..columns.len()).for_each(|index| matrix[(index, index)] += FLOOR);
-            let factor = Cholesky::new(&matrix)?;
-            let right = DVector::from_iterator(columns.len(), columns.iter().map(|column| -gradient[*column]));
-            let change = factor.solve(&right)[columns.len() - 1];
-            let variance = factor.trailing_covariance(1)[(0, 0)];
-            Some(SuspectedParameter { parameter: *parameter, change, information: variance.recip() })
+            let column = first + place;
+            let mut coupling = DVector::zeros(problem.layout.total());
+            for row in &order {
+                // The lower triangle is stored.
+                coupling[*row] = hessian[(column.max(*row), column.min(*row))];
+            }
+            let information = hessian[(column, column)] + FLOOR - coupling.dot(&factor.solve(&coupling));
+            let change = -(gradient[column] + coupling.dot(&step)) / information;
+            (information > 0.0).then_some(SuspectedParameter { parameter: *parameter, change, information })
         };
         tried.filter_map(score).collect()
     }
