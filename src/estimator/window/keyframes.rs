@@ -41,8 +41,12 @@ impl WindowState {
             if self.frames[last].stamp_ns < stationary.since_ns {
                 return Decision::new(true, "keyframe: first one while stationary", age_s, 0.0);
             }
+            // The gimbal of a vehicle at rest may be moved to calibrate it.
+            if let Some(decision) = self.keyframe_by_joints(last) {
+                return decision;
+            }
             let limit_s = seconds_from_ns(STATIONARY_KEYFRAME_NS);
-            let message = "stationary: keyframes by elapsed time only, s";
+            let message = "stationary: keyframes by elapsed time and moving joints only, s";
             return Decision::new(age_ns >= STATIONARY_KEYFRAME_NS, message, age_s, limit_s);
         }
         // Any camera can request a keyframe; cameras without an image are ignored.
@@ -64,10 +68,13 @@ impl WindowState {
     }
 
     /// Keyframe for joints that have moved since the last keyframe, with a chain whose rotations are given inaccurately.
+    ///
+    /// Not without encoder readings: many images of the same landmarks would lower σ by more than the errors of the chain,
+    /// because the joint angles compensate them.
     fn keyframe_by_joints(&self, last: usize) -> Option<Decision> {
         let (newest, before) = (self.frames.newest(), &self.frames[last]);
         let age_s = seconds_from_ns(newest.stamp_ns - before.stamp_ns);
-        if !self.calibration.leads_inaccurately() || age_s < KEYFRAME_JOINT_INTERVAL_S {
+        if newest.encoder.is_none() || !self.calibration.leads_inaccurately() || age_s < KEYFRAME_JOINT_INTERVAL_S {
             return None;
         }
         let joints_rad = newest.state.joints_rad.iter().zip(&before.state.joints_rad);

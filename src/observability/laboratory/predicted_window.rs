@@ -5,8 +5,8 @@ use nalgebra::{DMatrix, Vector2};
 use super::super::analysis::measured_information;
 use super::Situation;
 use crate::estimator::{
-    EstimatorOptions, HypotheticalFrame, HypotheticalLandmark, HypotheticalWindow, JointKnowledge, Linearization,
-    PoseKnowledge,
+    EstimatorOptions, HypotheticalFrame, HypotheticalLandmark, HypotheticalWindow, JointKnowledge, KEYFRAME_JOINT_RAD,
+    Linearization, PoseKnowledge,
 };
 use crate::geometry::{Dimension, RigidTransform};
 use crate::optimization::LandmarkModel;
@@ -31,7 +31,8 @@ pub(super) fn predicted_information(
     for index in 0..landmarks_per_frame * poses.len() {
         landmarks.extend(view.draw(index % poses.len(), 0));
     }
-    if !makes_keyframes(&landmarks, &poses) {
+    let by_joints = situation.joints_make_keyframes() && joints_move(&frames);
+    if !by_joints && !makes_keyframes(&landmarks, &poses) {
         landmarks.clear();
     }
     measured_information(&linearization(situation, frames, landmarks, situation.encoders))
@@ -134,8 +135,15 @@ impl<'a> PredictedView<'a> {
     }
 }
 
+/// True if a joint leaves its first angle by as much as makes a keyframe.
+fn joints_move(frames: &[HypotheticalFrame]) -> bool {
+    let Some((first, later)) = frames.split_first() else { return false };
+    let moves = |(angle, begin): (&f64, &f64)| (angle - begin).abs() >= KEYFRAME_JOINT_RAD;
+    later.iter().any(|frame| frame.joints_rad.iter().zip(&first.joints_rad).any(moves))
+}
+
 /// True if the estimator makes a keyframe of any frame after the first, by parallax or by new features. A camera that
-/// hardly translates makes none, whatever the motion of its gimbal, and its observations are dropped.
+/// hardly translates makes none in this way, whatever the motion of its gimbal, and its observations are dropped.
 fn makes_keyframes(landmarks: &[HypotheticalLandmark], poses: &[RigidTransform]) -> bool {
     let options = EstimatorOptions::default();
     let is_keyframe = |slot: usize| {

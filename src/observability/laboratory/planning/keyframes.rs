@@ -31,7 +31,6 @@ pub(super) fn keyframe_times_s(
     let images = ((to_s - from_s) / period_s - 1e-6).ceil().max(1.0) as usize;
     let mut times_s = vec![from_s];
     let mut last = pose(from_s);
-    let is_inaccurate = situation.has_inaccurate_rotations();
     for image in 1..images {
         let time_s = from_s + image as f64 * period_s;
         let newest = pose(time_s);
@@ -39,7 +38,7 @@ pub(super) fn keyframe_times_s(
         let new_ratio = 1.0 - common as f64 / points.len().max(1) as f64;
         let last_s = times_s.last().copied().unwrap_or(from_s);
         let moved_rad = |joint: usize| (motion.value(joint, time_s, 0) - motion.value(joint, last_s, 0)).abs();
-        let by_joints = is_inaccurate
+        let by_joints = situation.joints_make_keyframes()
             && time_s - last_s >= KEYFRAME_JOINT_INTERVAL_S - 1e-6
             && (0..motion.joint_count()).any(|joint| moved_rad(joint) >= KEYFRAME_JOINT_RAD);
         if by_joints || new_ratio > options.keyframe_new_ratio || parallax_rad >= options.keyframe_parallax_rad {

@@ -6,7 +6,7 @@ use super::super::{
 use crate::estimator::{Estimator, EstimatorConfig, EstimatorOptions, StepInput, StepReport};
 use crate::gimbal::{Chain, Parameterization};
 use crate::observability::{RankReport, analyse};
-use crate::sensors::Rig;
+use crate::sensors::{ChainPrior, Rig};
 use crate::simulation::{
     Exercise, SyntheticFlight, SyntheticFrame, SyntheticMotion, SyntheticOptions, VehicleSwing, synthetic_tracks,
 };
@@ -19,8 +19,14 @@ const SHARED_S: f64 = START_S - 0.4;
 const MOTION_S: f64 = super::super::ADVICE_DURATION_S;
 
 pub(super) fn flight(exercise: Exercise, seed: u64) -> SyntheticFlight {
+    flight_from(exercise, seed, SyntheticOptions::default().start_error)
+}
+
+/// [`flight`] with another error of the given chain.
+fn flight_from(exercise: Exercise, seed: u64, start_error: ChainPrior) -> SyntheticFlight {
     synthetic_tracks(&SyntheticOptions {
         seed,
+        start_error,
         duration_s: START_S + MOTION_S,
         features: 80,
         motion: SyntheticMotion::Hover,
@@ -87,11 +93,15 @@ fn sigma(rank: &RankReport, direction: &[f64]) -> f64 {
     direction.dot(&solved).sqrt()
 }
 
-/// Runs the suggested motion and every `every`-th of the others from the same state; returns the advice and,
-/// for each motion, the predicted and the estimated ratio of σ along the least observable direction.
-fn run_advised(seed: u64, every: usize) -> (Advice, Vec<(String, f64, f64)>) {
+/// Runs the chosen ones of the candidates, given with their places, from the same state; returns the advice and, for each
+/// motion, the predicted and the estimated ratio of σ along the least observable direction.
+fn run_advised(
+    seed: u64,
+    start_error: ChainPrior,
+    is_chosen: impl Fn(usize, &str) -> bool,
+) -> (Advice, Vec<(String, f64, f64)>) {
     let rest = Exercise::full(VehicleSwing::Hover, None);
-    let warm_up = flight(rest, seed);
+    let warm_up = flight_from(rest, seed, start_error);
     let mut start = estimator(&warm_up.given_rig, Parameterization::Minimal, true);
     let (report, rank) = run_flight(&mut start, &warm_up, -1.0, SHARED_S);
     let situation = Situation::of_step(&report, &rank, &warm_up.given_rig, "cam0").unwrap();
@@ -101,10 +111,11 @@ fn run_advised(seed: u64, every: usize) -> (Advice, Vec<(String, f64, f64)>) {
     let outcomes = advice
         .candidates
         .iter()
-        .step_by(every)
-        .map(|candidate| {
+        .enumerate()
+        .filter(|(place, candidate)| is_chosen(*place, &candidate.words))
+        .map(|(_, candidate)| {
             let mut estimator = start.clone();
-            let flight = flight(candidate.exercise, seed);
+            let flight = flight_from(candidate.exercise, seed, start_error);
             let (_, rank) = run_flight(&mut estimator, &flight, SHARED_S, START_S + MOTION_S);
             (candidate.words.clone(), candidate.remaining, sigma(&rank, &advice.least_observable.weights) / before)
         })
@@ -121,7 +132,8 @@ fn the_suggested_excitation_lowers_the_largest_sigma_most() {
 
 /// Checks the suggested motion and every fifth of the others.
 fn check_advice(seed: u64) {
-    let (advice, outcomes) = run_advised(seed, 5);
+    let start_error = SyntheticOptions::default().start_error;
+    let (advice, outcomes) = run_advised(seed, start_error, |place, _| place % 5 == 0);
     let table: Vec<String> = outcomes
         .iter()
         .map(|(words, predicted, left)| format!("{predicted:.3} predicted, {left:.3} estimated: {words}"))
@@ -138,6 +150,26 @@ fn check_advice(seed: u64) {
     let apart = outcomes.iter().filter(|(_, predicted, _)| *predicted >= 1.03 * first_predicted).count();
     assert!(apart >= 3, "{table}");
     assert!(advice.sentence().unwrap().starts_with(&advice.candidates[0].words));
+}
+
+#[test]
+fn swinging_joints_are_suggested_for_what_they_give_an_inaccurate_chain() {
+    // Moving joints make keyframes of a hovering camera if the chain is given inaccurately, and only then.
+    let start_error = |rotation_bound_rad| ChainPrior { translation_bound_m: 0.01, rotation_bound_rad };
+    let of = |rotation_bound_rad| {
+        let (_, outcomes) = run_advised(3, start_error(rotation_bound_rad), |_, words| words.contains("hover"));
+        outcomes
+    };
+    let (inaccurate, accurate) = (of(0.17), of(0.02));
+    let table = format!("inaccurate {inaccurate:#?}, accurate {accurate:#?}");
+    assert!(inaccurate.len() == 4 && accurate.len() == 4, "{table}");
+    let least = |outcomes: &[(String, f64, f64)]| {
+        outcomes.iter().fold([1.0_f64; 2], |[by_advice, by_run], (_, predicted, left)| {
+            [by_advice.min(*predicted), by_run.min(*left)]
+        })
+    };
+    assert!(least(&inaccurate).into_iter().all(|remaining| remaining < 0.95), "{table}");
+    assert!(least(&accurate).into_iter().all(|remaining| remaining > 0.95), "{table}");
 }
 
 #[test]
