@@ -21,7 +21,7 @@ fn diagnosed(
     input_fault: impl Fn(&mut OwnedStepInput, &Rig),
     measured: &[MeasuredFault],
 ) -> Diagnosis {
-    let flight = synthetic_tracks(&SyntheticOptions { duration_s: 6.0, ..SyntheticOptions::default() });
+    let flight = synthetic_tracks(&SyntheticOptions { duration_s: 5.0, ..SyntheticOptions::default() });
     let mut rig = flight.given_rig.clone();
     rig_fault(&mut rig);
     let spec = RunSpec::default();
