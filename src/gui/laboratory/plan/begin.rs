@@ -8,8 +8,9 @@ use crate::gui::units::fixed;
 use crate::observability::laboratory::{MotionProblem, MotionStart, PLAN_DURATION_S, PLAN_KNOT_S};
 use crate::simulation::{MotionSample, MotionSplines, PrescribedMotion};
 
-/// Largest difference in radians or metres at which an opened motion counts as shown exactly.
-const EXACT: f64 = 1e-6;
+/// Largest difference in radians or metres at which an opened motion counts as shown exactly: less than a digit of the
+/// message.
+const EXACT: f64 = 5e-5;
 
 impl PlanView {
     /// Makes the motion from which to start, or that of an opened file.
