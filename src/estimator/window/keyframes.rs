@@ -35,21 +35,27 @@ impl WindowState {
         let Some(last) = (0..newest).rev().find(|slot| self.frames[*slot].keyframe) else {
             return Decision::new(true, "the first keyframe of the window", 0.0, 0.0);
         };
-        if let Some(stationary) = &self.frames[newest].stationary {
-            let age_ns = self.frames[newest].stamp_ns - self.frames[last].stamp_ns;
-            let age_s = seconds_from_ns(age_ns);
-            if self.frames[last].stamp_ns < stationary.since_ns {
-                return Decision::new(true, "keyframe: first one while stationary", age_s, 0.0);
-            }
-            // The gimbal of a vehicle at rest may be moved to calibrate it.
-            if let Some(decision) = self.keyframe_by_joints(last) {
-                return decision;
-            }
-            let limit_s = seconds_from_ns(STATIONARY_KEYFRAME_NS);
-            let message = "stationary: keyframes by elapsed time and moving joints only, s";
-            return Decision::new(age_ns >= STATIONARY_KEYFRAME_NS, message, age_s, limit_s);
+        let decision = match &self.frames[newest].stationary {
+            Some(stationary) => self.keyframe_while_stationary(stationary.since_ns, last),
+            None => self.keyframe_by_images(setup, last),
+        };
+        if decision.keyframe { decision } else { self.keyframe_by_joints(last).unwrap_or(decision) }
+    }
+
+    fn keyframe_while_stationary(&self, since_ns: i64, last: usize) -> Decision {
+        let age_ns = self.frames.newest().stamp_ns - self.frames[last].stamp_ns;
+        let age_s = seconds_from_ns(age_ns);
+        if self.frames[last].stamp_ns < since_ns {
+            return Decision::new(true, "keyframe: first one while stationary", age_s, 0.0);
         }
-        // Any camera can request a keyframe; cameras without an image are ignored.
+        let limit_s = seconds_from_ns(STATIONARY_KEYFRAME_NS);
+        let message = "stationary: keyframes by elapsed time and moving joints only, s";
+        Decision::new(age_ns >= STATIONARY_KEYFRAME_NS, message, age_s, limit_s)
+    }
+
+    /// Any camera can request a keyframe; cameras without an image are ignored.
+    fn keyframe_by_images(&self, setup: &Setup, last: usize) -> Decision {
+        let newest = self.frames.newest_slot();
         let observed = |camera: usize| {
             let features = self.features[camera].values();
             (camera, features.filter(|feature| feature.observation(newest).is_some()).count())
@@ -62,7 +68,6 @@ impl WindowState {
         if decisions.is_empty() {
             return self.keyframe_by_image(setup, MAIN, last, 0);
         }
-        decisions.extend(self.keyframe_by_joints(last));
         let first = decisions.iter().position(|decision| decision.keyframe).unwrap_or(0);
         decisions.swap_remove(first)
     }
