@@ -23,8 +23,7 @@ pub struct Situation {
     pub chain: Chain,
     pub joints: Vec<LaboratoryJoint>,
     pub names: ParameterNames,
-    /// True if the chain is given so inaccurately that the estimator makes keyframes by the motion of joints, as far as
-    /// encoders measure it.
+    /// True if rotations of the chain are given worse than [`INACCURATE_ROTATION_RAD`].
     pub has_inaccurate_rotations: bool,
     /// Posterior of the calibration as the information matrix of its columns (n × n), in units of 10° and 3 cm.
     pub information: DMatrix<f64>,
@@ -70,7 +69,10 @@ impl Situation {
                 .map(|joint| LaboratoryJoint { name: joint.name.clone(), limits_rad: joint.limits_rad })
                 .collect(),
             names: rig.parameter_names(),
-            has_inaccurate_rotations: rig.gimbal.as_ref().is_some_and(|gimbal| is_inaccurate(gimbal.prior.sigmas())),
+            has_inaccurate_rotations: rig
+                .gimbal
+                .as_ref()
+                .is_some_and(|gimbal| gimbal.prior.sigmas().1 > INACCURATE_ROTATION_RAD),
             information,
             navigation: NavigationState {
                 world_from_imu: newest.world_from_imu,
@@ -108,7 +110,7 @@ impl Situation {
             camera: setup.camera.clone(),
             joints: setup.mechanism.joints.clone(),
             names: setup.mechanism.names.clone(),
-            has_inaccurate_rotations: is_inaccurate((Dimension::Length.scale(), Dimension::Angle.scale())),
+            has_inaccurate_rotations: Dimension::Angle.scale() > INACCURATE_ROTATION_RAD,
             information: rank.posterior.information(),
             navigation: last.navigation,
             joints_rad: last.joints_rad.clone(),
@@ -143,8 +145,7 @@ impl Situation {
         let chain = Chain::from_classical(&config.chain, config.parameterization);
         // Without encoders the estimator fixes the joint offsets.
         let chain = if encoder_sigma_rad.is_some() { chain } else { chain.without_joint_offsets() };
-        let prior = config.extrinsics_sigmas(0);
-        let (translation_m, rotation_rad) = prior;
+        let (translation_m, rotation_rad) = config.extrinsics_sigmas(0);
         let scale = scale_of(&chain);
         let covariance = chain.prior_covariance(&config.chain, translation_m, rotation_rad);
         let scaled = DMatrix::from_fn(covariance.nrows(), covariance.ncols(), |row, column| {
@@ -156,7 +157,7 @@ impl Situation {
             camera: config.camera.clone(),
             joints,
             names,
-            has_inaccurate_rotations: is_inaccurate(prior),
+            has_inaccurate_rotations: rotation_rad > INACCURATE_ROTATION_RAD,
             information: regular(scaled).cholesky()?.inverse(),
             navigation: NavigationState::default(),
             joints_rad,
@@ -189,11 +190,6 @@ impl Situation {
     pub(super) fn scale(&self) -> DVector<f64> {
         scale_of(&self.chain)
     }
-}
-
-/// True if moving joints make keyframes for a chain with these standard deviations (metres, radians).
-fn is_inaccurate((_, rotation_rad): (f64, f64)) -> bool {
-    rotation_rad > INACCURATE_ROTATION_RAD
 }
 
 fn scale_of(chain: &Chain) -> DVector<f64> {

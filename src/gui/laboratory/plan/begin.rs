@@ -8,8 +8,7 @@ use crate::gui::units::fixed;
 use crate::observability::laboratory::{MotionProblem, MotionStart, PLAN_DURATION_S, PLAN_KNOT_S};
 use crate::simulation::{MotionSample, MotionSplines, PrescribedMotion};
 
-/// Largest difference in radians or metres at which an opened motion counts as shown exactly: less than a digit of the
-/// message.
+/// Difference in radians or metres below which an opened motion counts as shown exactly: less than a shown digit.
 const EXACT: f64 = 5e-5;
 
 impl PlanView {
