@@ -67,7 +67,10 @@ fn time_offset_ms(report: &CheckReport, camera: &str) -> i32 {
 
 #[test]
 fn rotations_of_the_sample_log_detect_a_wrong_rig() {
-    let sample = Measured::of(&Path::new(env!("CARGO_MANIFEST_DIR")).join("sample_logs/garden.mcap"));
+    let mut sample = Measured::of(&Path::new(env!("CARGO_MANIFEST_DIR")).join("sample_logs/garden.mcap"));
+    // The first five seconds are enough for each fault.
+    let first_ns = sample.rotations.iter().map(|rotation| rotation.from_ns).min().expect("there are rotations");
+    sample.rotations.retain(|rotation| rotation.from_ns < first_ns + 5_000_000_000);
     let camera = sample.static_camera();
     let correct = sample.check(|_| {});
     expect(&correct, Severity::Good, &format!("the orientation of {camera} agrees with the rig"));

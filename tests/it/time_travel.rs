@@ -2,7 +2,7 @@
 //! summary was kept.
 
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 use dcvins::estimator::StageTimes;
 use dcvins::session::{
@@ -32,6 +32,12 @@ fn straight(specs: &[&str]) -> Computation {
     let computation = session::compute(&plan(specs, usize::MAX), None, &mut |_| {}).expect("the runs start");
     assert!(computation.recording().runs.iter().all(|run| run.error.is_none() && run.memory.summaries == 0));
     computation
+}
+
+/// [`straight`] of the run "auto", which several tests compare with.
+fn straight_auto() -> &'static Computation {
+    static AUTO: LazyLock<Computation> = LazyLock::new(|| straight(&["auto"]));
+    &AUTO
 }
 
 fn check_step(run: &RunRecord, number: usize, again: &StepRecord) {
@@ -73,7 +79,7 @@ fn played(session: &mut Session) {
 
 #[test]
 fn stepping_back_shows_what_was_seen_on_the_way_forward_with_little_memory() {
-    let forwards = straight(&["auto"]);
+    let forwards = straight_auto();
     let expected = &forwards.recording().runs[0];
     let mut session = Session::start(plan(&["auto"], 0)).expect("the session starts");
     played(&mut session);
@@ -98,8 +104,8 @@ fn stepping_back_shows_what_was_seen_on_the_way_forward_with_little_memory() {
 
 #[test]
 fn summaries_hold_everything_that_is_plotted_over_time() {
-    let (whole, summaries) = (straight(&["auto"]), session::compute(&plan(&["auto"], 0), None, &mut |_| {}));
-    let (whole, summaries) = (whole.into_recording(), summaries.expect("the runs start").into_recording());
+    let summaries = session::compute(&plan(&["auto"], 0), None, &mut |_| {});
+    let (whole, summaries) = (straight_auto().recording(), summaries.expect("the runs start").into_recording());
     assert!(summaries.runs[0].memory.summaries > 90);
     for (whole, kept) in whole.runs[0].steps.iter().zip(&summaries.runs[0].steps) {
         let mut report = whole.report.clone();
@@ -120,7 +126,7 @@ fn summaries_hold_everything_that_is_plotted_over_time() {
 
 #[test]
 fn the_solver_can_be_followed_through_a_step() {
-    let forwards = straight(&["auto"]);
+    let forwards = straight_auto();
     let run = &forwards.recording().runs[0];
     let number = 150;
     let iterations = &run.steps[number].report.iterations;

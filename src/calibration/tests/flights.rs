@@ -2,10 +2,11 @@
 
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
+use std::sync::LazyLock;
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use super::fixture::{flight, true_states};
+use super::fixture::{Flight, flight, true_states};
 use crate::calibration::{
     CalibrationError, CalibrationInput, CalibrationOptions, CalibrationOutcome, ChainDistance, EarlierFlights,
     Statistics, TrackedView, calibrate, transform_distance,
@@ -46,13 +47,24 @@ fn normalized_square(
     (0..sigmas.len()).map(square).sum::<f64>() / sigmas.len() as f64
 }
 
+/// Flights of seeds 1 to 3 with their calibrations, which have covariances of the poses.
+fn calibrated_flights() -> &'static [(Flight, CalibrationOutcome)] {
+    static FLIGHTS: LazyLock<Vec<(Flight, CalibrationOutcome)>> = LazyLock::new(|| {
+        let asked = CalibrationOptions { pose_covariances: true, ..CalibrationOptions::default() };
+        let of_seed = |seed| {
+            let flight = flight(&options(seed));
+            let outcome = calibrate(&flight.input, &asked, &mut |_| ControlFlow::Continue(())).unwrap();
+            (flight, outcome)
+        };
+        (1..=3).map(of_seed).collect()
+    });
+    &FLIGHTS
+}
+
 #[test]
 fn a_wrong_chain_is_found_within_its_sigmas() {
     let mut of_pixels = 0.0;
-    for seed in 1..=3 {
-        let flight = flight(&options(seed));
-        let outcome =
-            calibrate(&flight.input, &CalibrationOptions::default(), &mut |_| ControlFlow::Continue(())).unwrap();
+    for (seed, (flight, outcome)) in (1..).zip(calibrated_flights()) {
         let distance = |chain| {
             let distance = ChainDistance::over(chain, &flight.true_chain, &outcome.visited_rad).unwrap();
             (distance.translation_mean_m, distance.rotation_mean_rad)
@@ -128,13 +140,10 @@ fn a_calibration_ends_at_the_stage_in_which_it_is_interrupted() {
 #[test]
 fn the_batch_trajectory_is_within_its_sigmas() {
     let mut nees = Vec::new();
-    for seed in 1..=3 {
-        let flight = flight(&options(seed));
-        let asked = CalibrationOptions { pose_covariances: true, ..CalibrationOptions::default() };
-        let outcome = calibrate(&flight.input, &asked, &mut |_| ControlFlow::Continue(())).unwrap();
+    for (seed, (flight, outcome)) in (1..).zip(calibrated_flights()) {
         let stamps_ns = flight.input.static_camera.views.iter().map(|view| view.stamp_ns);
         let truths: BTreeMap<i64, RigidTransform> =
-            stamps_ns.zip(true_states(&flight)).map(|(stamp_ns, state)| (stamp_ns, state.world_from_imu)).collect();
+            stamps_ns.zip(true_states(flight)).map(|(stamp_ns, state)| (stamp_ns, state.world_from_imu)).collect();
         let first = &outcome.trajectory[0];
         let true_first = truths[&first.stamp_ns];
         let turn = first.world_from_imu.rotation * true_first.rotation.inverse();
@@ -168,7 +177,7 @@ fn the_batch_trajectory_is_within_its_sigmas() {
 }
 
 /// The part of a flight's images for which `keep` holds, by their stamps in seconds.
-fn part(flight: &super::fixture::Flight, keep: impl Fn(f64) -> bool) -> CalibrationInput {
+fn part(flight: &Flight, keep: impl Fn(f64) -> bool) -> CalibrationInput {
     let mut input = flight.input.clone();
     let kept = |view: &TrackedView| keep(seconds_from_ns(view.stamp_ns));
     input.static_camera.views.retain(kept);

@@ -295,7 +295,7 @@ fn the_window_converges_from_poor_initial_values() {
         (1_u64..=3)
             .into_par_iter()
             .map(|seed| {
-                let flight = far_off(seed, 20.0);
+                let flight = far_off(seed, 12.0);
                 let config = fixture::config(&flight.given_rig, Parameterization::Minimal, options);
                 let (_, reports) = run_flight(&flight.frames, config);
                 trajectory_error_m(&flight.frames, &reports).0

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::memory::{recorded, recorded_with};
+use super::memory::{estimated, recorded_with};
 use crate::estimator::{ColumnGroup, Linearization};
 use crate::session::record::PoseError;
 use crate::simulation::{SyntheticOptions, synthetic_tracks};
@@ -40,7 +40,7 @@ fn covariances_are_those_of_the_rows_of_the_window() {
 fn errors_agree_with_covariances_that_grow_from_the_first_frame_on() {
     let nees_of = |seed| {
         let flight = synthetic_tracks(&SyntheticOptions { seed, duration_s: 10.0, ..SyntheticOptions::default() });
-        let errors = recorded(&flight, "auto").pose_errors();
+        let errors = estimated(&flight, "auto").pose_errors();
         let [first, last] = [errors.first(), errors.last()].map(|error| error.unwrap().covariance);
         assert!(first.position_sigma_m() < 0.03, "{} m", first.position_sigma_m());
         assert!(last.position_sigma_m() > first.position_sigma_m());

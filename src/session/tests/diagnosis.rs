@@ -9,7 +9,7 @@ use crate::session::diagnosis::{Cause, Diagnosis, DiagnosisVerdict, diagnose_run
 use crate::session::engine::{History, OwnedStepInput, RunEngine, estimator_config};
 use crate::session::plan::{MeasurementCorrection, RunSpec};
 use crate::session::record::RunRecord;
-use crate::session::tests::memory::input_of;
+use crate::session::tests::memory::{estimated_step, input_of};
 use crate::simulation::{SyntheticOptions, synthetic_tracks};
 
 /// Stamp from which on a fault of the recording acts, in nanoseconds.
@@ -24,7 +24,8 @@ fn diagnosed(
     let flight = synthetic_tracks(&SyntheticOptions { duration_s: 5.0, ..SyntheticOptions::default() });
     let mut rig = flight.given_rig.clone();
     rig_fault(&mut rig);
-    let spec = RunSpec::default();
+    // A window of five frames: its trials take half of the time of one of ten.
+    let spec: RunSpec = "auto:window=5".parse().unwrap();
     let config = estimator_config(&rig, &spec).unwrap();
     let sigma_rad = config.encoder_sigma_rad.unwrap();
     let mut engine = RunEngine::new(config, None);
@@ -36,7 +37,7 @@ fn diagnosed(
         let input = Arc::new(input);
         history.inputs().push(Arc::clone(&input));
         history.before_step(step, &engine, &input);
-        record.push(engine.step(&input));
+        record.push(estimated_step(&mut engine, &input));
     }
     let findings = || measured.iter().map(error_of).collect();
     diagnose_run(&rig, &record, &history, &findings, &mut |_, _| ControlFlow::Continue(()))

@@ -1,7 +1,7 @@
 //! Forks on a synthetic flight, and a session that stops at breakpoints and forks there.
 
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 use crate::estimator::{FactorKind, FrameId, JacobianFactor, Phase, StageTimes};
 use crate::gimbal;
@@ -19,6 +19,11 @@ struct SimulatedRun {
     history: Arc<History>,
     steps: Vec<StepRecord>,
 }
+
+/// Runs that several tests fork.
+static AUTO: LazyLock<SimulatedRun> = LazyLock::new(|| simulated_run("auto"));
+static MINIMAL: LazyLock<SimulatedRun> = LazyLock::new(|| simulated_run("minimal"));
+static CLASSICAL: LazyLock<SimulatedRun> = LazyLock::new(|| simulated_run("classical"));
 
 fn simulated_run(spec: &str) -> SimulatedRun {
     let flight = synthetic_tracks(&SyntheticOptions { duration_s: 6.0, ..SyntheticOptions::default() });
@@ -70,7 +75,7 @@ const FORK_AT: usize = 90;
 
 #[test]
 fn a_fork_without_changes_is_its_parent() {
-    let parent = simulated_run("auto");
+    let parent = &*AUTO;
     for (again, step) in parent.forked(FORK_AT, "").unwrap().iter().zip(&parent.steps[FORK_AT..]) {
         assert_eq!(bits(again), bits(step));
     }
@@ -78,7 +83,7 @@ fn a_fork_without_changes_is_its_parent() {
 
 #[test]
 fn a_fork_goes_on_in_another_parameterization() {
-    let parent = simulated_run("minimal");
+    let parent = &*MINIMAL;
     let tracking = |step: &StepRecord| step.report.phase == Phase::Tracking && step.report.restarts == 0;
     for (changes, columns) in [("classical", 24), ("poe", 18), ("minimal-swapped", 18), ("auto", 18)] {
         let fork = parent.forked(FORK_AT, changes).unwrap();
@@ -89,7 +94,7 @@ fn a_fork_goes_on_in_another_parameterization() {
         }
     }
     // The reverse direction removes the redundant columns.
-    let parent = simulated_run("classical");
+    let parent = &*CLASSICAL;
     for (fork, parent) in parent.forked(FORK_AT, "minimal").unwrap().iter().zip(&parent.steps[FORK_AT..]) {
         assert!(tracking(fork) && fork.rank.as_ref().unwrap().deficit_parameterization == 0);
         assert!(
@@ -102,7 +107,7 @@ fn a_fork_goes_on_in_another_parameterization() {
 
 #[test]
 fn sensor_parameters_are_estimated_from_the_fork_on() {
-    let parent = simulated_run("classical");
+    let parent = &*CLASSICAL;
     let fork = parent.forked(FORK_AT, "estimate=readout+intrinsics+imu-intrinsics+timeshift").unwrap();
     for (step, parent) in fork.iter().zip(&parent.steps[FORK_AT..]) {
         assert_eq!(step.report.restarts, 0);
@@ -127,7 +132,7 @@ fn sensor_parameters_are_estimated_from_the_fork_on() {
 
 #[test]
 fn frozen_parameters_stay_and_changed_ones_start_at_their_values() {
-    let parent = simulated_run("auto");
+    let parent = &*AUTO;
     let before = &parent.steps[FORK_AT - 1];
     let (frozen_value, _) = parameter(before, "L2.alpha");
     let fork = parent.forked(FORK_AT, "freeze=L2.alpha").unwrap();
@@ -149,7 +154,7 @@ fn frozen_parameters_stay_and_changed_ones_start_at_their_values() {
 
 #[test]
 fn measurements_can_be_dropped_and_disturbed() {
-    let parent = simulated_run("auto");
+    let parent = &*AUTO;
     let ids: Vec<String> = parent.steps[FORK_AT].report.features[..8].iter().map(|it| it.id.0.to_string()).collect();
     let fork = parent.forked(FORK_AT, &format!("drop={}", ids.join("+"))).unwrap();
     let used = |steps: &[StepRecord], id: &String| {
@@ -188,7 +193,7 @@ fn imu_row_norm(flight: &SyntheticFlight, step: &StepRecord, slot: usize) -> f64
 
 #[test]
 fn imu_noise_scales_the_rows_of_later_intervals() {
-    let parent = simulated_run("auto");
+    let parent = &*AUTO;
     for factor in [2.0, 0.25] {
         let fork = parent.forked(FORK_AT, &format!("imu-noise={factor}")).unwrap();
         let (fork, parent_step) = (&fork[0], &parent.steps[FORK_AT]);
@@ -210,7 +215,7 @@ fn imu_noise_scales_the_rows_of_later_intervals() {
 fn a_fork_with_other_imu_noise_from_the_start_equals_a_run_of_such_a_rig() {
     // A power of two, so that the order of multiplications does not change the rounding.
     const FACTOR: f64 = 4.0;
-    let parent = simulated_run("auto");
+    let parent = &*AUTO;
     let fork = parent.forked(0, &format!("imu-noise={FACTOR}")).unwrap();
     let mut rig = parent.flight.given_rig.clone();
     let noise = &mut rig.imu.noise;
@@ -231,7 +236,7 @@ fn a_fork_with_other_imu_noise_from_the_start_equals_a_run_of_such_a_rig() {
 
 #[test]
 fn encoder_readings_can_be_disabled() {
-    let parent = simulated_run("auto");
+    let parent = &*AUTO;
     let fork = parent.forked(FORK_AT, "encoder=off").unwrap();
     for (number, step) in fork.iter().enumerate() {
         let read = |index: usize| step.report.window[index].encoder_angles_rad.is_some();
@@ -291,7 +296,7 @@ fn one_camera_of_two_can_be_disabled() {
 
 #[test]
 fn unsupported_changes_are_reported() {
-    let problem = simulated_run("auto").forked(FORK_AT, "freeze=L2.alfa").unwrap_err();
+    let problem = AUTO.forked(FORK_AT, "freeze=L2.alfa").unwrap_err();
     assert!(problem.contains("'L2.alfa'") && problem.contains("roll.alpha"), "{problem}");
     let problem = simulated_run("auto:calibrate=off").forked(FORK_AT, "freeze=L2.alpha").unwrap_err();
     assert!(problem.contains("calibrate=off"), "{problem}");
@@ -299,7 +304,7 @@ fn unsupported_changes_are_reported() {
 
 #[test]
 fn a_run_that_initializes_can_be_forked() {
-    let parent = simulated_run("minimal");
+    let parent = &*MINIMAL;
     let first = parent.steps.iter().position(|step| step.report.phase == Phase::Tracking).unwrap();
     let fork = parent.forked(first - 2, "classical").unwrap();
     let begun = fork.iter().find(|step| step.report.phase == Phase::Tracking).unwrap();

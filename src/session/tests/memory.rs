@@ -27,8 +27,34 @@ pub(crate) fn recorded(flight: &SyntheticFlight, spec: &str) -> RunRecord {
     recorded_with(flight, spec, None)
 }
 
+/// A step without its observability analysis, which takes most of the time of a first window.
+pub(in crate::session) fn estimated_step(engine: &mut RunEngine, input: &OwnedStepInput) -> StepRecord {
+    StepRecord {
+        report: engine.report_without_rank(input),
+        rank: None,
+        tracks: Arc::clone(input.main_tracks()),
+        ground_truth: input.ground_truth,
+        log_time_ns: input.log_time_ns,
+        summary_only: false,
+    }
+}
+
 /// A recorded run in which every n-th report keeps its linearization.
 pub(super) fn recorded_with(
+    flight: &SyntheticFlight,
+    spec: &str,
+    keep_linearization_every: Option<usize>,
+) -> RunRecord {
+    run_by(RunEngine::step, flight, spec, keep_linearization_every)
+}
+
+/// A run without its observability analysis.
+pub(super) fn estimated(flight: &SyntheticFlight, spec: &str) -> RunRecord {
+    run_by(estimated_step, flight, spec, None)
+}
+
+fn run_by(
+    step: impl Fn(&mut RunEngine, &OwnedStepInput) -> StepRecord,
     flight: &SyntheticFlight,
     spec: &str,
     keep_linearization_every: Option<usize>,
@@ -39,7 +65,7 @@ pub(super) fn recorded_with(
     let mut engine = RunEngine::new(config, keep_linearization_every);
     let mut run = RunRecord::new(spec, "cam0".to_owned());
     for frame in &flight.frames {
-        run.push(engine.step(&input_of(frame, sigma_rad)));
+        run.push(step(&mut engine, &input_of(frame, sigma_rad)));
     }
     run
 }

@@ -5,7 +5,7 @@ use std::sync::mpsc::sync_channel;
 
 use rayon::prelude::*;
 
-use super::memory::input_of;
+use super::memory::{estimated_step, input_of};
 use crate::estimator::Phase;
 use crate::session::engine::{EarlierPasses, EngineMessage, OwnedStepInput, RunEngine, estimator_config};
 use crate::session::record::{PoseError, RunRecord};
@@ -30,7 +30,7 @@ fn recorded_in_passes(flight: &SyntheticFlight, text: &str) -> (RunRecord, Vec<E
     let mut engine = RunEngine::new(config, None);
     let mut run = RunRecord::new(spec, "cam0".to_owned());
     for input in &inputs {
-        run.push(engine.step(input));
+        run.push(estimated_step(&mut engine, input));
     }
     drop(results);
     (run, progress.into_iter().collect())

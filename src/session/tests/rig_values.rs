@@ -1,6 +1,6 @@
 //! A rig's values of estimated parameters, and a run's values in a rig.
 
-use super::memory::recorded;
+use super::memory::estimated;
 use crate::gimbal::tests::parameter;
 use crate::gimbal::{ParameterGroup, ParameterId, Quantity};
 use crate::observability::Determination;
@@ -19,7 +19,7 @@ fn every_estimated_parameter_has_a_value_in_a_rig_and_leads_back_to_it() {
         imu_intrinsics_error: [0.01, 0.01],
         ..SyntheticOptions::default()
     });
-    let run = recorded(&flight, "auto:readout=on,intrinsics=on,imu-intrinsics=on");
+    let run = estimated(&flight, "auto:readout=on,intrinsics=on,imu-intrinsics=on");
     let estimate = &run.steps.last().unwrap().report.calibration;
     let count = |group| estimate.parameters.iter().filter(|id| id.group() == group).count();
     let groups: Vec<usize> = ParameterGroup::all().map(count).collect();
@@ -62,7 +62,7 @@ fn pose_and_clock_of_the_second_imu_lead_back_to_the_rig() {
         gimbal_imu: true,
         ..SyntheticOptions::default()
     });
-    let run = recorded(&flight, "auto:gimbal-imu-axes=on");
+    let run = estimated(&flight, "auto:gimbal-imu-axes=on");
     let estimate = &run.steps.last().unwrap().report.calibration;
     let calibrated = run.calibrated_rig(&flight.given_rig);
     assert_eq!(calibrated.imu, flight.given_rig.imu, "no intrinsics were estimated");

@@ -3,14 +3,16 @@
 use crate::estimator::StepWarning;
 use crate::session::plan::ForkChanges;
 use crate::session::record::{RunRecord, warnings_of};
-use crate::session::tests::memory::recorded;
+use crate::session::tests::memory::estimated;
 use crate::simulation::{SyntheticOptions, synthetic_tracks};
 
 /// A camera time offset of 15 ms is reported from some step on, and only by records that contain that step.
 #[test]
 fn a_warning_is_kept_once_with_its_first_time_and_its_count() {
-    let flight = synthetic_tracks(&SyntheticOptions { clock_offsets_s: [0.015, 0.0], ..SyntheticOptions::default() });
-    let mut run = recorded(&flight, "auto");
+    let clock_offsets_s = [0.015, 0.0];
+    let flight =
+        synthetic_tracks(&SyntheticOptions { clock_offsets_s, duration_s: 10.0, ..SyntheticOptions::default() });
+    let mut run = estimated(&flight, "auto");
     let warns = |step: &&std::sync::Arc<crate::session::StepRecord>, warning: &StepWarning| {
         step.report.warnings.contains(warning)
     };

@@ -4,6 +4,7 @@ use super::super::{
     Advice, LABORATORY_IMU, LaboratoryForm, LaboratoryMotion, LaboratorySetup, Mechanism, Situation, advise, excitation,
 };
 use crate::estimator::{Estimator, EstimatorConfig, EstimatorOptions, StepInput, StepReport};
+use crate::geometry::seconds_from_ns;
 use crate::gimbal::{Chain, Parameterization};
 use crate::observability::{RankReport, analyse};
 use crate::sensors::{ChainPrior, Rig};
@@ -44,6 +45,7 @@ pub(super) fn estimator(rig: &Rig, parameterization: Parameterization, use_encod
     })
 }
 
+/// One step, with its ranks if the linearization is kept.
 fn step(estimator: &mut Estimator, frame: &SyntheticFrame) -> (StepReport, Option<RankReport>) {
     let sigma = estimator.config().encoder_sigma_rad.unwrap();
     let joints = frame.encoder_angles(sigma).filter(|_| estimator.config().use_encoder);
@@ -75,15 +77,17 @@ pub(super) fn run_flight(
     from_s: f64,
     to_s: f64,
 ) -> (StepReport, RankReport) {
-    let mut last = None;
-    for frame in &flight.frames {
-        let time_s = frame.stamp_ns as f64 * 1e-9;
-        if time_s > from_s && time_s <= to_s {
-            let (report, rank) = step(estimator, frame);
-            last = rank.map(|rank| (report, rank));
-        }
+    let time_s = |frame: &SyntheticFrame| seconds_from_ns(frame.stamp_ns);
+    let is_inside = |frame: &&SyntheticFrame| time_s(frame) > from_s && time_s(frame) <= to_s;
+    let frames: Vec<&SyntheticFrame> = flight.frames.iter().filter(is_inside).collect();
+    let (last, before) = frames.split_last().expect("the flight has frames then");
+    estimator.set_keep_linearization(false);
+    for frame in before {
+        step(estimator, frame);
     }
-    last.expect("the estimator tracks at the end")
+    estimator.set_keep_linearization(true);
+    let (report, rank) = step(estimator, last);
+    (report, rank.expect("the estimator tracks at the end"))
 }
 
 /// Standard deviation along a direction after a step.
