@@ -8,9 +8,10 @@ use super::follow::Follower;
 use super::step_work::{REPAINT, StepWork};
 use crate::gimbal::ParameterId;
 use crate::gui::convergence::names::place_of;
+use crate::gui::step_advice::step_advice;
 use crate::observability::Determination;
 use crate::observability::laboratory::Advice;
-use crate::session::{FlightParameter, FlightVerdicts, Recording, RunRecord, StepRecord, flight_advice};
+use crate::session::{FlightParameter, FlightVerdicts, Recording, RunRecord, StepRecord};
 
 /// Calibration tables of all runs; clones share them.
 #[derive(Clone, Debug, Default)]
@@ -60,7 +61,7 @@ pub(crate) struct ParameterHistory {
 struct FlightTable {
     follower: Follower,
     verdicts: FlightVerdicts,
-    advice: StepWork<Advice>,
+    advice: StepWork<Arc<Advice>>,
     /// True if `report` contains the motions of the last step's advice.
     advised: bool,
     report: FlightReport,
@@ -112,12 +113,12 @@ impl FlightTable {
         if let Some(step) = step {
             self.advice.request(step, "flight advice", in_background, || {
                 let (step, rig, camera) = (Arc::clone(step), Arc::clone(&recording.rig), run.camera_key.clone());
-                move || flight_advice(&step, &rig, &camera)
+                move || step_advice(&step, &rig, &camera)
             });
         }
         let advised = step.is_some_and(|step| self.advice.has_result(step));
         if changed || advised != self.advised {
-            let advice = self.advice.last().and_then(|(_, advice)| advice).filter(|_| advised);
+            let advice = self.advice.last().and_then(|(_, advice)| advice).filter(|_| advised).map(|advice| &**advice);
             self.report.rows = self.verdicts.table(&recording.rig.parameter_names(), advice).into();
             self.advised = advised;
         }

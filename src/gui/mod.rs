@@ -34,6 +34,7 @@ pub mod residuals;
 pub(crate) mod samples;
 pub mod scene;
 mod slide;
+mod step_advice;
 mod step_work;
 pub mod stills_figure;
 pub mod study;

@@ -9,9 +9,10 @@ use super::sections::{fact_ui, section_ui};
 use crate::geometry::seconds_from_ns;
 use crate::gimbal::ParameterId;
 use crate::gui::PanelContext;
+use crate::gui::step_advice::step_advice;
 use crate::gui::step_work::{REPAINT, StepWork};
 use crate::gui::theme::ROW_HEIGHT;
-use crate::observability::laboratory::{Advice, Situation, advise};
+use crate::observability::laboratory::Advice;
 use crate::session::{LostSince, Recording, RunRecord, StepRecord};
 
 /// Number of alternatives to the best motion.
@@ -40,17 +41,17 @@ impl Pace {
 }
 
 #[derive(Debug)]
-struct StepAdvice {
+struct RankAdvice {
     /// Start of the present loss of observability.
     since: Option<LostSince>,
-    advice: Option<Advice>,
+    advice: Option<Arc<Advice>>,
 }
 
 /// Results for one step; recomputed for another step.
 #[derive(Debug, Default)]
 pub(super) struct AdviceUi {
     run: Option<u64>,
-    results: StepWork<StepAdvice>,
+    results: StepWork<RankAdvice>,
     /// Step at the cursor, and the time when the cursor reached it, in seconds of the window's clock.
     seen: Option<(Arc<StepRecord>, f64)>,
     /// Start of the last computation, in seconds of the window's clock.
@@ -110,7 +111,7 @@ impl AdviceUi {
             format!(" at {:.2} s", seconds_from_ns(of.report.stamp_ns))
         };
         let Some(rank) = &of.rank else { return };
-        let advice = results.and_then(|results| results.advice.as_ref());
+        let advice = results.and_then(|results| results.advice.as_deref());
         match rank.sensor_excitation() {
             Some((parameter, motion)) => sensor_advice_ui(ui, ctx, parameter, motion, advice, &time),
             None => advice_ui(ui, ctx, advice, &time),
@@ -119,7 +120,7 @@ impl AdviceUi {
 
     /// Draws the alternatives to the suggested excitation.
     pub(super) fn alternatives_ui(&self, ui: &mut Ui, ctx: &PanelContext<'_>) {
-        let advice = self.results.last().and_then(|(_, results)| results?.advice.as_ref());
+        let advice = self.results.last().and_then(|(_, results)| results?.advice.as_deref());
         let lines = advice.map(alternatives).filter(|lines| !lines.is_empty());
         let Some(lines) = lines else { return };
         section_ui(ui, ctx.theme, ctx.presentation, "Other excitations", ROW_HEIGHT * lines.len() as f32, |ui| {
@@ -135,7 +136,7 @@ impl AdviceUi {
             return None;
         }
         let (_, results) = self.results.last()?;
-        let sentence = results.and_then(|results| results.advice.as_ref()).and_then(Advice::sentence);
+        let sentence = results.and_then(|results| results.advice.as_deref()).and_then(Advice::sentence);
         Some(sentence.unwrap_or_else(|| NO_MOTION.to_owned()))
     }
 
@@ -151,13 +152,10 @@ impl AdviceUi {
         self.results.request(step, "advice", in_background, || {
             let before = run.steps.partition_point(|other| other.report.stamp_ns < step.report.stamp_ns);
             let earlier: Arc<[Arc<StepRecord>]> = run.steps[..before].into();
-            let situation = step
-                .rank
-                .as_ref()
-                .and_then(|rank| Situation::of_step(&step.report, rank, &ctx.recording.rig, &run.camera_key));
-            let step = Arc::clone(step);
+            let (step, rig, camera) = (Arc::clone(step), Arc::clone(&ctx.recording.rig), run.camera_key.clone());
             move || {
-                Some(StepAdvice { since: LostSince::of(&earlier, &step), advice: situation.as_ref().and_then(advise) })
+                let (since, advice) = (LostSince::of(&earlier, &step), step_advice(&step, &rig, &camera));
+                Some(RankAdvice { since, advice })
             }
         });
     }
