@@ -206,8 +206,8 @@ impl TriangularFactor {
     }
 
     /// `R`, upper triangular (n × n).
-    pub(crate) fn to_matrix(&self) -> DMatrix<f64> {
-        DMatrix::from_column_slice(self.columns, self.columns, &self.entries)
+    pub(crate) fn into_matrix(self) -> DMatrix<f64> {
+        DMatrix::from_vec(self.columns, self.columns, self.entries)
     }
 
     /// First `count` rows of `R`, without those that no row was merged into.

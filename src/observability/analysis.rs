@@ -152,7 +152,7 @@ pub(super) fn measured_rows(linearization: &Linearization, kept: &[ColumnId]) ->
     let norms: Vec<f64> = order.iter().map(|column| measurements.column(*column).norm()).collect();
     let mut factor = TriangularFactor::new(order.len());
     factor.merge_rows(measurements, &order);
-    let mut rows = project_out(&factor, nuisance.len(), &norms);
+    let mut rows = project_out(factor, nuisance.len(), &norms);
     let calibration = rows.ncols() - scale.len();
     for (column, scale) in scale.iter().enumerate() {
         rows.column_mut(calibration + column).scale_mut(*scale);
@@ -228,8 +228,8 @@ impl Projected {
         let mut constrained = factor.trailing(first_with_prior);
         constrained.merge_rows(priors, &order[first_with_prior..]);
         Some(Self {
-            measurements: project_out(&factor, nuisance, &norms),
-            with_priors: project_out(&constrained, nuisance - first_with_prior, &norms[first_with_prior..]),
+            measurements: project_out(factor, nuisance, &norms),
+            with_priors: project_out(constrained, nuisance - first_with_prior, &norms[first_with_prior..]),
         })
     }
 }

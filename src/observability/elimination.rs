@@ -12,8 +12,8 @@ const DEPENDENT: f64 = 1e-11;
 
 /// Rows of a triangular factor with its first `nuisance` columns projected out; `norms` are the column norms of the
 /// matrix that was factorized.
-pub(super) fn project_out(factor: &TriangularFactor, nuisance: usize, norms: &[f64]) -> DMatrix<f64> {
-    let mut upper = factor.to_matrix();
+pub(super) fn project_out(factor: TriangularFactor, nuisance: usize, norms: &[f64]) -> DMatrix<f64> {
+    let mut upper = factor.into_matrix();
     let rank = skip_dependent_columns(&mut upper, nuisance, norms, DEPENDENT).len();
     upper.view((rank, nuisance), (upper.nrows() - rank, upper.ncols() - nuisance)).into_owned()
 }
@@ -24,7 +24,7 @@ pub(super) fn without_leading(rows: &DMatrix<f64>, count: usize) -> DMatrix<f64>
     let norms: Vec<f64> = rows.column_iter().map(|column| column.norm()).collect();
     let mut factor = TriangularFactor::new(rows.ncols());
     factor.merge_rows(rows, &order);
-    project_out(&factor, count, &norms)
+    project_out(factor, count, &norms)
 }
 
 /// Norms of the columns of two stacked Jacobians with the same columns.

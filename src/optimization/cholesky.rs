@@ -28,12 +28,24 @@ impl Cholesky {
 
     /// [`Self::new`] for the unknowns in `order` only, eliminated in that order; `diagonal` maps the diagonal entries.
     pub(crate) fn ordered(matrix: &DMatrix<f64>, order: Vec<usize>, diagonal: impl Fn(f64) -> f64) -> Option<Self> {
+        Self::ordered_in(Vec::new(), matrix, order, diagonal)
+    }
+
+    /// [`Self::ordered`] in the memory of an earlier factor, see [`Self::into_storage`].
+    pub(crate) fn ordered_in(
+        storage: Vec<f64>,
+        matrix: &DMatrix<f64>,
+        order: Vec<usize>,
+        diagonal: impl Fn(f64) -> f64,
+    ) -> Option<Self> {
         let count = order.len();
         let mut places = vec![None; matrix.nrows()];
         for (place, index) in order.iter().enumerate() {
             places[*index] = Some(place);
         }
-        let mut lower = vec![0.0; count * count];
+        let mut lower = storage;
+        lower.clear();
+        lower.resize(count * count, 0.0);
         for (column, of_column) in places.iter().enumerate() {
             let Some(of_column) = *of_column else { continue };
             let below = &matrix.column(column).data.into_slice()[column..];
@@ -53,6 +65,11 @@ impl Cholesky {
             *entry = diagonal(*entry);
         }
         Arch::new().dispatch(Factorization { lower: &mut lower, count }).then_some(Self { order, lower })
+    }
+
+    /// Memory of the factor, for a later one.
+    pub(crate) fn into_storage(self) -> Vec<f64> {
+        self.lower
     }
 
     fn count(&self) -> usize {

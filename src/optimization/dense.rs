@@ -9,7 +9,7 @@ pub(crate) fn triangularize(matrix: &DMatrix<f64>) -> DMatrix<f64> {
     let order: Vec<usize> = (0..matrix.ncols()).collect();
     let mut factor = TriangularFactor::new(matrix.ncols());
     factor.merge_rows(matrix, &order);
-    factor.to_matrix()
+    factor.into_matrix()
 }
 
 /// A column depends on the previous ones when no more than this fraction of it is independent.

@@ -10,6 +10,8 @@ use crate::optimization::{LandmarkRows, PoseBlocks};
 
 /// Columns of a block of the camera: a pose, or its intrinsics.
 const BLOCK: usize = 6;
+/// Rows that an observation adds.
+const OBSERVATION: usize = 2;
 
 /// Whitened rows of some tracks.
 #[derive(Clone, Debug)]
@@ -46,7 +48,12 @@ impl ProjectedRows {
             let (slot, row) = (block / N, block % N);
             BLOCK * if slot < frames { N * (newest - slot) + row } else { block }
         };
-        let mut groups = vec![Vec::new(); frames];
+        let mut heights = vec![0; frames];
+        for observation in tracks.iter().flat_map(|track| &track.observations) {
+            heights[newest - observation.slot] += OBSERVATION;
+        }
+        let capacity = |(begin, height)| Vec::with_capacity(height * (columns - BLOCK * N * begin));
+        let mut groups: Vec<Vec<f64>> = heights.into_iter().enumerate().map(capacity).collect();
         let mut newest_rows = Vec::new();
         let mut local = LandmarkRows::default();
         for (track, landmark) in tracks.iter().zip(landmarks) {

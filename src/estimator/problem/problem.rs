@@ -215,12 +215,28 @@ impl NormalEquations {
 
     /// Reduced normal equations over poses, joints, velocities, biases and calibration (lower triangle).
     pub(crate) fn reduced(&self, layout: &Layout, visual: &[ReducedVisualEquations]) -> (DMatrix<f64>, DVector<f64>) {
-        let mut hessian = self.others.hessian.clone();
+        let mut hessian = DMatrix::default();
+        let gradient = self.reduce_into(&mut hessian, layout, visual);
+        (hessian, gradient)
+    }
+
+    /// [`Self::reduced`] in the memory of an earlier matrix; returns the gradient.
+    pub(crate) fn reduce_into(
+        &self,
+        hessian: &mut DMatrix<f64>,
+        layout: &Layout,
+        visual: &[ReducedVisualEquations],
+    ) -> DVector<f64> {
+        if hessian.shape() == self.others.hessian.shape() {
+            hessian.copy_from(&self.others.hessian);
+        } else {
+            *hessian = self.others.hessian.clone();
+        }
         let mut gradient = self.others.gradient.clone();
         for (camera, visual) in self.cameras.iter().zip(visual) {
-            camera.add_to(layout, visual, &mut hessian, &mut gradient);
+            camera.add_to(layout, visual, hessian, &mut gradient);
         }
-        (hessian, gradient)
+        gradient
     }
 
     /// Steps of the landmarks by camera, for a step of the other unknowns.

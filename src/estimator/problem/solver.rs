@@ -1,5 +1,6 @@
 //! Levenberg–Marquardt solver of the window, landmarks eliminated.
 
+use std::mem;
 use std::rc::Rc;
 
 use nalgebra::{DMatrix, DVector, Matrix6};
@@ -71,7 +72,16 @@ const SETTLED_SIGMAS: f64 = 0.01;
 pub(crate) fn solve(problem: &Problem<'_>, start: Estimate, limits: SolverLimits) -> Solution {
     let first = problem.layout.calibration().start;
     let fixed = start.calibration.frozen_columns().into_iter().map(|column| first + column).collect();
-    let mut window = DampedWindow { problem, fixed, step_norms: Vec::new(), moved_sigmas: 0.0, last: None };
+    let mut window = DampedWindow {
+        problem,
+        fixed,
+        step_norms: Vec::new(),
+        moved_sigmas: 0.0,
+        last: None,
+        hessian: DMatrix::default(),
+        hessian_is_information: false,
+        factor_storage: Vec::new(),
+    };
     let start = window.evaluated(start);
     let costs_before = start.costs;
     let options = DampedOptions {
@@ -109,14 +119,14 @@ struct DampedWindow<'a> {
     /// Root mean square step of calibration and newest joint angles in the last solved step, in standard deviations.
     moved_sigmas: f64,
     /// Last linearization for which a step was solved.
-    last: Option<SolvedLinearization>,
-}
-
-/// Window linearized at an estimate.
-struct SolvedLinearization {
-    equations: Rc<NormalEquations>,
-    /// Information after marginalization of the landmarks; `None` unless the last step was damped by [`DAMPING`] only.
-    information: Option<DMatrix<f64>>,
+    last: Option<Rc<NormalEquations>>,
+    /// Normal equations after elimination of the landmarks, of the last tried step.
+    hessian: DMatrix<f64>,
+    /// True if [`Self::hessian`] belongs to [`Self::last`] and was damped by [`DAMPING`] only: with more damping, the
+    /// eliminated landmarks withhold too much information.
+    hessian_is_information: bool,
+    /// Memory of the last factor.
+    factor_storage: Vec<f64>,
 }
 
 struct Evaluated {
@@ -132,14 +142,12 @@ impl DampedWindow<'_> {
     /// Factorization of the undamped information at the last linearization: damping would act as information about
     /// position, yaw and other weakly observable unknowns. `None` without a solved step or if the information is not
     /// positive definite.
-    fn posterior(&self) -> Option<Cholesky> {
-        let layout = &self.problem.layout;
-        let SolvedLinearization { equations, information } = self.last.as_ref()?;
-        if let Some(information) = information {
-            return factor(layout, information, 0.0);
+    fn posterior(&mut self) -> Option<Cholesky> {
+        let equations = self.last.take()?;
+        if !self.hessian_is_information {
+            self.reduce(&equations, &equations.eliminate(0.0));
         }
-        let (information, _) = self.reduced(equations, &equations.eliminate(0.0));
-        factor(layout, &information, 0.0)
+        self.factor(0.0)
     }
 
     /// Posterior covariance of the calibration, other unknowns marginalized; zero for fixed parameters.
@@ -168,21 +176,30 @@ impl DampedWindow<'_> {
         factor.trailing_length(count, step) / (count.max(1) as f64).sqrt()
     }
 
-    /// Normal equations after elimination of the landmarks; fixed parameters do not move.
-    fn reduced(
-        &self,
-        equations: &NormalEquations,
-        eliminated: &[ReducedVisualEquations],
-    ) -> (DMatrix<f64>, DVector<f64>) {
-        let (mut hessian, mut gradient) = equations.reduced(&self.problem.layout, eliminated);
-        fix(&self.fixed, &mut hessian, &mut gradient);
-        (hessian, gradient)
+    /// Computes [`Self::hessian`] and returns the gradient, landmarks eliminated; fixed parameters do not move.
+    fn reduce(&mut self, equations: &NormalEquations, eliminated: &[ReducedVisualEquations]) -> DVector<f64> {
+        let mut gradient = equations.reduce_into(&mut self.hessian, &self.problem.layout, eliminated);
+        fix(&self.fixed, &mut self.hessian, &mut gradient);
+        self.hessian_is_information = false;
+        gradient
+    }
+
+    /// Factorization of [`Self::hessian`] with λ = `damping`; `None` if it is not positive definite.
+    fn factor(&mut self, damping: f64) -> Option<Cholesky> {
+        let storage = mem::take(&mut self.factor_storage);
+        let order = self.problem.layout.elimination_order();
+        Cholesky::ordered_in(storage, &self.hessian, order, |diagonal| with_floor(diagonal, damping))
     }
 }
 
-/// Factors normal equations without landmarks, with λ = `damping`; `None` where they are not positive definite.
-pub(crate) fn factor(layout: &Layout, hessian: &DMatrix<f64>, damping: f64) -> Option<Cholesky> {
-    Cholesky::ordered(hessian, layout.elimination_order(), |diagonal| diagonal + (damping * diagonal + FLOOR))
+/// Factors an information matrix without landmarks; `None` if it is not positive definite.
+pub(crate) fn factor(layout: &Layout, information: &DMatrix<f64>) -> Option<Cholesky> {
+    Cholesky::ordered(information, layout.elimination_order(), |diagonal| with_floor(diagonal, 0.0))
+}
+
+/// Entry of the diagonal with λ = `damping`.
+fn with_floor(diagonal: f64, damping: f64) -> f64 {
+    diagonal + (damping * diagonal + FLOOR)
 }
 
 impl DampedProblem for DampedWindow<'_> {
@@ -202,17 +219,16 @@ impl DampedProblem for DampedWindow<'_> {
     }
 
     fn step(&mut self, evaluated: &Evaluated, equations: &Rc<NormalEquations>, damping: f64) -> Option<Evaluated> {
-        let layout = &self.problem.layout;
         let reduced = equations.eliminate(damping);
-        let (hessian, gradient) = self.reduced(equations, &reduced);
-        let factor = factor(layout, &hessian, damping)?;
+        let gradient = self.reduce(equations, &reduced);
+        let factor = self.factor(damping)?;
         let step = -factor.solve(&gradient);
-        let landmarks = equations.landmark_steps(layout, &reduced, &step);
+        let landmarks = equations.landmark_steps(&self.problem.layout, &reduced, &step);
         self.step_norms.push(step.norm());
         self.moved_sigmas = self.moved_sigmas(&factor, &step);
-        // With more damping, the eliminated landmarks withhold too much information.
-        let information = (damping <= DAMPING).then_some(hessian);
-        self.last = Some(SolvedLinearization { equations: Rc::clone(equations), information });
+        self.factor_storage = factor.into_storage();
+        self.last = Some(Rc::clone(equations));
+        self.hessian_is_information = damping <= DAMPING;
         Some(self.evaluated(self.problem.stepped(&evaluated.estimate, &step, &landmarks)))
     }
 }

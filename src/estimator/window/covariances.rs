@@ -26,7 +26,7 @@ pub(crate) fn covariances(setup: &Setup, window: &WindowState) -> Option<WindowC
     let equations = problem.linearize(&estimate);
     let layout = &problem.layout;
     let (information, _) = equations.reduced(layout, &equations.eliminate(0.0));
-    let factor = factor(layout, &information, 0.0)?;
+    let factor = factor(layout, &information)?;
     let newest = layout.velocity_bias(layout.frames.checked_sub(1)?);
     let newest_bias = factor.covariance_of(newest.start + VELOCITY..newest.end);
     let calibration = factor.trailing_covariance(layout.calibration);
