@@ -417,6 +417,7 @@ pub(super) fn step_towards(
 ) -> Option<(UnitQuaternion<f64>, Vector3<f64>)> {
     let basis = tangent_basis(&at.direction);
     let previous_from_now = at.rotation.to_rotation_matrix().into_inner().transpose();
+    // Lower triangle.
     let mut normal = SMatrix::<f64, 5, 5>::zeros();
     let mut right = SVector::<f64, 5>::zeros();
     for pair in pairs {
@@ -433,7 +434,11 @@ pub(super) fn step_towards(
         let by_rotation = previous_from_now * rotated.cross(&other_plane);
         let by_direction = basis.tr_mul(&rotated.cross(&pair.now));
         let row = SVector::<f64, 5>::new(by_rotation.x, by_rotation.y, by_rotation.z, by_direction.x, by_direction.y);
-        normal += row * row.transpose() * weight;
+        for column in 0..5 {
+            for below in column..5 {
+                normal[(below, column)] += row[below] * row[column] * weight;
+            }
+        }
         right -= row * (gap * weight);
     }
     let mut corner = normal.fixed_view_mut::<3, 3>(0, 0);

@@ -116,6 +116,7 @@ fn direction_of(pairs: &[BearingPair], rotation: &UnitQuaternion<f64>) -> Vector
 /// Normal equations of a motion (rotation and direction) and one parameter.
 #[derive(Default)]
 struct Sums {
+    /// Lower triangle.
     motion: SMatrix<f64, 5, 5>,
     motion_right: SVector<f64, 5>,
     mixed: SVector<f64, 5>,
@@ -127,7 +128,11 @@ struct Sums {
 
 impl Sums {
     fn add(&mut self, by_motion: &SVector<f64, 5>, by_parameter: f64, residual: f64, weight: f64) {
-        self.motion += by_motion * by_motion.transpose() * weight;
+        for column in 0..5 {
+            for below in column..5 {
+                self.motion[(below, column)] += by_motion[below] * by_motion[column] * weight;
+            }
+        }
         self.motion_right += by_motion * (residual * weight);
         self.mixed += by_motion * (by_parameter * weight);
         self.parameter += by_parameter * by_parameter * weight;
