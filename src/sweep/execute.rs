@@ -284,7 +284,7 @@ impl StudyFolder {
     fn write_perturbed_rig(&self, key: &str, job: &StudyJob, files: &JobFiles) -> Result<PathBuf, JobError> {
         let log = FlightLog::open(&files.log)?;
         let given = Rig::for_log(&log, files.rig.as_deref())?;
-        let truth = Rig::ground_truth_for_log(&log, files.truth.as_deref())?;
+        let truth = given.own_ground_truth(&log, files.truth.as_deref())?;
         let seed = job.seed.unwrap_or(0);
         let mut rig = job.perturbation.apply(&given, truth.as_ref(), seed).map_err(StudyFileError::from)?;
         let folder = self.job(key);

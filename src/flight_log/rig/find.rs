@@ -41,6 +41,23 @@ impl Rig {
         let found = find(log, explicit, &log.path().with_extension("truth.yaml"), ".truth.yaml")?;
         Ok(found.map(|(rig, _)| rig))
     }
+
+    /// Finds the ground truth of this rig, as [`Self::ground_truth_for_log`]. A file that was not asked for is left out if
+    /// it belongs to another mechanism, as where one log is run with several rigs.
+    ///
+    /// # Errors
+    ///
+    /// If the given file has another number of joints for a camera of this rig.
+    pub fn own_ground_truth(&self, log: &FlightLog, explicit: Option<&Path>) -> Result<Option<Self>, LogError> {
+        let Some(truth) = Self::ground_truth_for_log(log, explicit)? else { return Ok(None) };
+        let joints = |rig: &Self, key: &str| rig.chain_of_camera(key).map(|chain| chain.joint_count());
+        let differs = |key: &&str| joints(&truth, key).is_some_and(|count| joints(self, key) != Some(count));
+        let Some(key) = self.cameras.iter().map(|camera| &*camera.key).find(differs) else { return Ok(Some(truth)) };
+        let Some(path) = explicit else { return Ok(None) };
+        let [given, expected] = [&truth, self].map(|rig| joints(rig, key).unwrap_or(0));
+        let problem = format!("{given} joints in the ground truth, {expected} in the rig '{}'", self.name);
+        Err(LogError::Rig { field: key.to_owned(), problem, path: path.to_owned() })
+    }
 }
 
 /// Rig with the paths of known but unused keys of its file.

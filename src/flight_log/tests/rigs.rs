@@ -41,6 +41,25 @@ fn a_rig_is_found_beside_the_log_then_in_it() {
 }
 
 #[test]
+fn the_ground_truth_of_another_mechanism_is_left_out_or_refused() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("flight.mcap");
+    let link = "  - {joint: yaw, theta_offset: -1.56, d: 0.046, a: 0.016, alpha: -1.55, limits: [-3.14, 3.14]}\n";
+    let two_joints = RIG.replace(link, &format!("{link}{}", link.replace("yaw", "roll")));
+    write_log(&path, &[("x.rig.yaml", RIG), ("x.truth.yaml", &two_joints)], None);
+    let log = FlightLog::open(&path).unwrap();
+    let rig = Rig::for_log(&log, None).unwrap();
+    assert_eq!(rig.own_ground_truth(&log, None).unwrap(), None);
+    let other = Rig::from_yaml(&two_joints, Path::new("two.rig.yaml")).unwrap();
+    assert_eq!(other.own_ground_truth(&log, None).unwrap().as_ref(), Some(&other));
+    let file = folder.path().join("given.yaml");
+    std::fs::write(&file, &two_joints).unwrap();
+    let refused = rig.own_ground_truth(&log, Some(&file)).unwrap_err().to_string();
+    let words = ["cam0", "2 joints in the ground truth, 1 in the rig 'test'", "given.yaml"];
+    assert!(words.iter().all(|word| refused.contains(word)), "{refused}");
+}
+
+#[test]
 fn a_broken_attachment_is_named() {
     let folder = TempDir::new().unwrap();
     let path = folder.path().join("flight.mcap");

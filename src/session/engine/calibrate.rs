@@ -101,7 +101,7 @@ pub fn calibrate(
     let log = Arc::new(FlightLog::open_with(&request.log_path, &request.limits)?);
     check_start(&log, request.start_s)?;
     let given_rig = Rig::for_log(&log, request.rig_path.as_deref())?;
-    let ground_truth_rig = Rig::ground_truth_for_log(&log, request.ground_truth_path.as_deref())?;
+    let ground_truth_rig = given_rig.own_ground_truth(&log, request.ground_truth_path.as_deref())?;
     let entries = CalibratedEntries::of(&given_rig, request)?;
     let mounts = (entries.imu_from_camera, &entries.gimbal);
     let cameras = [&entries.static_camera, &entries.gimbal_camera];

@@ -97,7 +97,7 @@ impl SessionPlan {
         let log = Arc::new(FlightLog::open_with(&request.log_path, &request.limits)?);
         check_start(&log, request.start_s)?;
         let rig = Rig::for_log(&log, request.rig_path.as_deref())?;
-        let ground_truth_rig = Rig::ground_truth_for_log(&log, request.ground_truth_path.as_deref())?;
+        let ground_truth_rig = rig.own_ground_truth(&log, request.ground_truth_path.as_deref())?;
         let mut specs = request.specs.clone();
         if specs.is_empty() {
             specs.push(RunSpec::default());
