@@ -17,11 +17,12 @@ const LATER_NS: i64 = 3_500_000_000;
 
 /// Diagnosis of a flight whose rig and inputs have a fault; `measured` are the faults that the check of its log finds.
 fn diagnosed(
+    duration_s: f64,
     rig_fault: impl Fn(&mut Rig),
     input_fault: impl Fn(&mut OwnedStepInput, &Rig),
     measured: &[MeasuredFault],
 ) -> Diagnosis {
-    let flight = synthetic_tracks(&SyntheticOptions { duration_s: 5.0, ..SyntheticOptions::default() });
+    let flight = synthetic_tracks(&SyntheticOptions { duration_s, ..SyntheticOptions::default() });
     let mut rig = flight.given_rig.clone();
     rig_fault(&mut rig);
     // A window of five frames: its trials take half of the time of one of ten.
@@ -59,7 +60,7 @@ fn no_fault(_: &mut OwnedStepInput, _: &Rig) {}
 
 #[test]
 fn a_sound_flight_has_no_cause() {
-    let found = diagnosed(|_| (), no_fault, &[]);
+    let found = diagnosed(5.0, |_| (), no_fault, &[]);
     assert_eq!((found.verdict, found.trials, found.causes.len()), (DiagnosisVerdict::Agrees, 0, 0), "{found}");
     assert!(found.to_string().contains("nothing to diagnose"), "{found}");
 }
@@ -80,7 +81,7 @@ fn a_wrong_focal_length_is_named_with_its_value() {
         }
         input.tracks[0] = Arc::new(tracks);
     };
-    let found = diagnosed(longer, bearings, &[]);
+    let found = diagnosed(4.0, longer, bearings, &[]);
     assert_eq!((found.verdict, found.causes[0].cause), (DiagnosisVerdict::Cause, Cause::Focal), "{found}");
     let [MeasurementCorrection::Focal(factor)] = found.causes[0].changes.corrections.as_slice() else {
         panic!("{found}")
@@ -110,7 +111,7 @@ fn assert_jump(found: &Diagnosis) {
 #[test]
 fn an_offset_of_a_joint_is_named_with_its_time() {
     // The check is wrong here: its fault does not explain the residuals, so that all causes are tried.
-    let found = diagnosed(|_| (), jump, &[MeasuredFault::JointsReversed(vec!["pitch".to_owned()])]);
+    let found = diagnosed(5.0, |_| (), jump, &[MeasuredFault::JointsReversed(vec!["pitch".to_owned()])]);
     assert_jump(&found);
     assert!(!found.measured && found.headline().contains("by the trials"), "{found}");
 }
@@ -118,7 +119,7 @@ fn an_offset_of_a_joint_is_named_with_its_time() {
 #[test]
 fn a_fault_that_the_check_measures_is_undone_first() {
     let offset = MeasuredFault::JointOffset { joint: "yaw".to_owned(), offset_rad: -0.27, since_s: Some(3.4) };
-    let found = diagnosed(|_| (), jump, &[offset]);
+    let found = diagnosed(5.0, |_| (), jump, &[offset]);
     assert_jump(&found);
     assert!(found.measured && found.trials < 60, "{found}");
     assert!(found.headline().ends_with("by the check of the log and by the trials"), "{found}");
@@ -126,7 +127,7 @@ fn a_fault_that_the_check_measures_is_undone_first() {
 
 #[test]
 fn a_fault_that_no_change_undoes_ends_the_search() {
-    let found = diagnosed(|_| (), jump, &[MeasuredFault::Irreversible(FaultySource::Joints)]);
+    let found = diagnosed(5.0, |_| (), jump, &[MeasuredFault::Irreversible(FaultySource::Joints)]);
     assert_eq!((found.verdict, found.trials, found.causes.len()), (DiagnosisVerdict::LogFault, 0, 0), "{found}");
     assert!(found.headline().ends_with("by the check of the log"), "{found}");
 }
