@@ -417,7 +417,7 @@ pub(super) fn step_towards(
 ) -> Option<(UnitQuaternion<f64>, Vector3<f64>)> {
     let basis = tangent_basis(&at.direction);
     let previous_from_now = at.rotation.to_rotation_matrix().into_inner().transpose();
-    // Lower triangle.
+    // The factorization reads the lower triangle only.
     let mut normal = SMatrix::<f64, 5, 5>::zeros();
     let mut right = SVector::<f64, 5>::zeros();
     for pair in pairs {

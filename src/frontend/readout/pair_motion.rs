@@ -116,7 +116,7 @@ fn direction_of(pairs: &[BearingPair], rotation: &UnitQuaternion<f64>) -> Vector
 /// Normal equations of a motion (rotation and direction) and one parameter.
 #[derive(Default)]
 struct Sums {
-    /// Lower triangle.
+    /// Information of the motion's unknowns, its lower triangle.
     motion: SMatrix<f64, 5, 5>,
     motion_right: SVector<f64, 5>,
     mixed: SVector<f64, 5>,
