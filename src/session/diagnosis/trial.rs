@@ -12,7 +12,7 @@ use crate::gimbal::{ClassicalChain, ParameterId};
 use crate::sensors::Rig;
 use crate::session::engine::{OwnedStepInput, RunEngine, apply_fork, guarded};
 use crate::session::plan::{ForkChanges, MeasurementCorrection, RunSpec};
-use crate::session::record::{RunRecord, StepRecord};
+use crate::session::record::RunRecord;
 
 /// The run to be diagnosed.
 pub(super) struct DiagnosedRun<'a> {
@@ -76,7 +76,7 @@ impl DiagnosedRun<'_> {
         changes: &ForkChanges,
         mut record: RunRecord,
     ) -> Option<RunRecord> {
-        let push = &mut |report: StepReport, input: &OwnedStepInput| record.push(step_record(report, input));
+        let push = &mut |report: StepReport, input: &OwnedStepInput| record.push(input.record(report, None));
         self.steps(span, change_at, changes, None, push)?;
         Some(record)
     }
@@ -123,17 +123,6 @@ impl DiagnosedRun<'_> {
 
     fn resolution_px(&self) -> [usize; 2] {
         self.rig.camera(self.camera_key).map_or([0; 2], |camera| camera.model.resolution_px)
-    }
-}
-
-fn step_record(report: StepReport, input: &OwnedStepInput) -> StepRecord {
-    StepRecord {
-        report,
-        rank: None,
-        tracks: Arc::clone(input.main_tracks()),
-        ground_truth: input.ground_truth,
-        log_time_ns: input.log_time_ns,
-        summary_only: false,
     }
 }
 

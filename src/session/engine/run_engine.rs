@@ -104,14 +104,7 @@ impl RunEngine {
         report.times.observability_ms = watch.elapsed_ms() - estimated_ms;
         report.times.frontend_ms = input.frontend_ms;
         report.times.step_ms = input.frontend_ms + watch.elapsed_ms();
-        StepRecord {
-            report,
-            rank,
-            tracks: Arc::clone(input.main_tracks()),
-            ground_truth: input.ground_truth,
-            log_time_ns: input.log_time_ns,
-            summary_only: false,
-        }
+        input.record(report, rank)
     }
 
     /// Runs the same step without the observability analysis; the estimator ends in the same state.

@@ -5,12 +5,13 @@ use std::sync::Arc;
 
 use parking_lot::{Condvar, Mutex};
 
-use crate::estimator::{StepMeasurements, allocated_bytes};
+use crate::estimator::{StepMeasurements, StepReport, allocated_bytes};
 use crate::flight_log::SensorFrame;
 use crate::frontend::{TrackedFeature, TrackedFrame};
 use crate::geometry::RigidTransform;
+use crate::observability::RankReport;
 use crate::sensors::{ImuSample, JointAngles};
-use crate::session::record::tracks_bytes;
+use crate::session::record::{StepRecord, tracks_bytes};
 
 /// Input of one step: measurements of one camera or of a synchronized frame set.
 ///
@@ -45,6 +46,18 @@ pub(in crate::session) struct OwnedStepInput {
 }
 
 impl OwnedStepInput {
+    /// Record of the step with this input.
+    pub(in crate::session) fn record(&self, report: StepReport, rank: Option<RankReport>) -> StepRecord {
+        StepRecord {
+            report,
+            rank,
+            tracks: Arc::clone(self.main_tracks()),
+            ground_truth: self.ground_truth,
+            log_time_ns: self.log_time_ns,
+            summary_only: false,
+        }
+    }
+
     pub(in crate::session) fn of_camera(frame: SensorFrame, tracks: TrackedFrame, frontend_ms: f64) -> Self {
         Self {
             frame_index: frame.index,

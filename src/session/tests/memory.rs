@@ -29,14 +29,7 @@ pub(crate) fn recorded(flight: &SyntheticFlight, spec: &str) -> RunRecord {
 
 /// A step without its observability analysis, which takes most of the time of a first window.
 pub(in crate::session) fn estimated_step(engine: &mut RunEngine, input: &OwnedStepInput) -> StepRecord {
-    StepRecord {
-        report: engine.report_without_rank(input),
-        rank: None,
-        tracks: Arc::clone(input.main_tracks()),
-        ground_truth: input.ground_truth,
-        log_time_ns: input.log_time_ns,
-        summary_only: false,
-    }
+    input.record(engine.report_without_rank(input), None)
 }
 
 /// A recorded run in which every n-th report keeps its linearization.
