@@ -7,6 +7,7 @@ pub(crate) use estimator_config::rigid_chain;
 pub use estimator_config::{
     CameraSensorPrior, DEFAULT_CHAIN_PRIOR, EstimatorConfig, RigidCamera, imu_columns, imu_intrinsics, rigid_columns,
 };
+pub(crate) use options::FIRST_KEYFRAME_INTERVAL_S;
 pub use options::{
     EstimatorOptions, INACCURATE_ROTATION_RAD, KEYFRAME_JOINT_INTERVAL_S, KEYFRAME_JOINT_RAD, TrackContinuation,
     VisualLoss,

@@ -16,6 +16,10 @@ pub const KEYFRAME_JOINT_RAD: f64 = 0.05;
 /// Shortest time since the last keyframe for that, in seconds; a moving vehicle makes keyframes more often.
 pub const KEYFRAME_JOINT_INTERVAL_S: f64 = 0.2;
 
+/// Shortest time between keyframes by parallax in the first window where rotations of the chain are given inaccurately,
+/// in seconds: the window then covers more motion of the joints with fewer frames.
+pub(crate) const FIRST_KEYFRAME_INTERVAL_S: f64 = 0.14;
+
 /// Treatment of a tracked feature whose anchor leaves the window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TrackContinuation {
@@ -114,7 +118,7 @@ impl Default for EstimatorOptions {
         Self {
             window: 10,
             first_window_factor: 2,
-            inaccurate_first_window_factor: 4,
+            inaccurate_first_window_factor: 3,
             pixel_sigma_px: 0.25,
             loss: VisualLoss::Adaptive,
             landmark_model: LandmarkModel::BearingAndInverseDistance,

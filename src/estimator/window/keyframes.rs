@@ -3,13 +3,13 @@
 use super::features;
 use super::setup::Setup;
 use super::window_state::WindowState;
-use crate::estimator::config::{KEYFRAME_JOINT_INTERVAL_S, KEYFRAME_JOINT_RAD};
+use crate::estimator::config::{FIRST_KEYFRAME_INTERVAL_S, KEYFRAME_JOINT_INTERVAL_S, KEYFRAME_JOINT_RAD};
 use crate::estimator::report::{Event, EventKind};
 use crate::estimator::state::calibrations::MAIN;
 use crate::geometry::seconds_from_ns;
 
 /// Interval of keyframes while stationary, so that IMU intervals stay short enough to be integrated again.
-const STATIONARY_KEYFRAME_NS: i64 = 5_000_000_000;
+const STATIONARY_KEYFRAME_S: f64 = 5.0;
 
 /// Keyframe decision on the newest frame, with the deciding value.
 struct Decision {
@@ -43,14 +43,17 @@ impl WindowState {
     }
 
     fn keyframe_while_stationary(&self, since_ns: i64, last: usize) -> Decision {
-        let age_ns = self.frames.newest().stamp_ns - self.frames[last].stamp_ns;
-        let age_s = seconds_from_ns(age_ns);
+        let age_s = self.age_s(last);
         if self.frames[last].stamp_ns < since_ns {
             return Decision::new(true, "keyframe: first one while stationary", age_s, 0.0);
         }
-        let limit_s = seconds_from_ns(STATIONARY_KEYFRAME_NS);
         let message = "stationary: keyframes by elapsed time and moving joints only, s";
-        Decision::new(age_ns >= STATIONARY_KEYFRAME_NS, message, age_s, limit_s)
+        Decision::new(age_s >= STATIONARY_KEYFRAME_S, message, age_s, STATIONARY_KEYFRAME_S)
+    }
+
+    /// Time from the frame at a slot to the newest one, in seconds.
+    fn age_s(&self, slot: usize) -> f64 {
+        seconds_from_ns(self.frames.newest().stamp_ns - self.frames[slot].stamp_ns)
     }
 
     /// Any camera can request a keyframe; cameras without an image are ignored.
@@ -78,8 +81,8 @@ impl WindowState {
     /// because the joint angles compensate them.
     fn keyframe_by_joints(&self, last: usize) -> Option<Decision> {
         let (newest, before) = (self.frames.newest(), &self.frames[last]);
-        let age_s = seconds_from_ns(newest.stamp_ns - before.stamp_ns);
-        if newest.encoder.is_none() || !self.calibration.leads_inaccurately() || age_s < KEYFRAME_JOINT_INTERVAL_S {
+        let is_apart = self.age_s(last) >= KEYFRAME_JOINT_INTERVAL_S;
+        if newest.encoder.is_none() || !self.calibration.leads_inaccurately() || !is_apart {
             return None;
         }
         let joints_rad = newest.state.joints_rad.iter().zip(&before.state.joints_rad);
@@ -112,6 +115,15 @@ impl WindowState {
         }
         let limit = options.keyframe_parallax_rad;
         let chosen = parallax >= limit;
+        let age_s = self.age_s(last);
+        let is_first_window = self.prior.is_none() && self.calibration.leads_inaccurately();
+        if chosen && is_first_window && age_s < FIRST_KEYFRAME_INTERVAL_S {
+            let message = format!(
+                "no keyframe: {age_s:.2} s since the last one (at least {FIRST_KEYFRAME_INTERVAL_S} s in the first \
+                 window of an inaccurate chain)"
+            );
+            return Decision::new(false, message, age_s, FIRST_KEYFRAME_INTERVAL_S);
+        }
         let verdict = if chosen { "keyframe" } else { "no keyframe" };
         let message = format!(
             "{verdict}: parallax to the last keyframe {:.2}° (threshold {:.2}°), rotation compensated",
