@@ -257,12 +257,11 @@ impl MechanismMotion<'_> {
         }
     }
 
-    fn rotation(&self, time_s: f64, joints_rad: &[f64]) -> UnitQuaternion<f64> {
+    fn rotation(&self, time_s: f64) -> UnitQuaternion<f64> {
         let rotation_vector = |time_s: f64| Vector3::from_fn(|axis, _| ROTATION[axis].at(time_s, 0));
-        let yaw = so3::exp(&(Vector3::z() * (2.0 * ROTATION[2].at(time_s, 0))));
-        let imu_from_camera = || self.mechanism.chain.imu_from_camera(joints_rad).rotation;
-        let start =
-            || so3::exp(&rotation_vector(0.0)) * self.mechanism.chain.imu_from_camera(&self.joints_rad(0.0)).rotation;
+        let yaw = || so3::exp(&(Vector3::z() * (2.0 * ROTATION[2].at(time_s, 0))));
+        let imu_from_camera = |time_s: f64| self.mechanism.chain.imu_from_camera(&self.joints_rad(time_s)).rotation;
+        let start = || so3::exp(&rotation_vector(0.0)) * imu_from_camera(0.0);
         match self.motion {
             LaboratoryMotion::TranslationOnly
             | LaboratoryMotion::Hover
@@ -274,12 +273,12 @@ impl MechanismMotion<'_> {
             LaboratoryMotion::SteadyTurn => {
                 so3::exp(&(Vector3::z() * (TURN_RATE_RAD_PER_S * time_s))) * so3::exp(&rotation_vector(0.0))
             }
-            LaboratoryMotion::YawOnly | LaboratoryMotion::YawPlanar | LaboratoryMotion::YawInPlace => yaw,
-            LaboratoryMotion::YawTilted => yaw * so3::exp(&rotation_vector(0.0)),
+            LaboratoryMotion::YawOnly | LaboratoryMotion::YawPlanar | LaboratoryMotion::YawInPlace => yaw(),
+            LaboratoryMotion::YawTilted => yaw() * so3::exp(&rotation_vector(0.0)),
             LaboratoryMotion::Stabilized
             | LaboratoryMotion::StabilizedRotationOnly
-            | LaboratoryMotion::CameraStationary => start() * imu_from_camera().inverse(),
-            LaboratoryMotion::YawFollowing => yaw * start() * imu_from_camera().inverse(),
+            | LaboratoryMotion::CameraStationary => start() * imu_from_camera(time_s).inverse(),
+            LaboratoryMotion::YawFollowing => yaw() * start() * imu_from_camera(time_s).inverse(),
             LaboratoryMotion::Aggressive
             | LaboratoryMotion::OneJointFrozen
             | LaboratoryMotion::AllJointsFrozen
@@ -290,10 +289,9 @@ impl MechanismMotion<'_> {
     }
 
     pub(super) fn world_from_imu(&self, time_s: f64) -> RigidTransform {
-        let joints_rad = self.joints_rad(time_s);
-        let rotation = self.rotation(time_s, &joints_rad);
+        let rotation = self.rotation(time_s);
         let position_m = if self.motion == LaboratoryMotion::CameraStationary {
-            -(rotation * self.mechanism.chain.imu_from_camera(&joints_rad).translation_m)
+            -(rotation * self.mechanism.chain.imu_from_camera(&self.joints_rad(time_s)).translation_m)
         } else {
             self.path_m(time_s, 0)
         };
@@ -335,7 +333,7 @@ impl MechanismMotion<'_> {
     /// Angular rate in rad/s and specific force in m/s² in the IMU frame, to about 1e-13 and, where the path depends on
     /// the joints, 1e-10.
     pub(super) fn rate_and_force(&self, time_s: f64) -> (Vector3<f64>, Vector3<f64>) {
-        let rotation = self.world_from_imu(time_s).rotation;
+        let rotation = self.rotation(time_s);
         let acceleration = if self.motion == LaboratoryMotion::CameraStationary {
             second_derivative(|time_s| self.world_from_imu(time_s).translation_m, time_s)
         } else {
@@ -346,8 +344,7 @@ impl MechanismMotion<'_> {
     }
 
     fn angular_velocity(&self, time_s: f64, rotation: &UnitQuaternion<f64>) -> Vector3<f64> {
-        let since = |time_s: f64| so3::log(&(rotation.inverse() * self.world_from_imu(time_s).rotation));
-        derivative(since, time_s)
+        derivative(|time_s| so3::log(&(rotation.inverse() * self.rotation(time_s))), time_s)
     }
 
     /// First or second derivative of the position: exact, except for a path that depends on the joints.
@@ -365,13 +362,12 @@ impl MechanismMotion<'_> {
 
     /// Measurement of an ideal IMU at a time.
     fn imu_sample(&self, time_s: f64) -> ImuSample {
-        let rotation_at = |time_s: f64| self.world_from_imu(time_s).rotation;
-        let rotation_change = rotation_at(time_s - STEP_S).inverse() * rotation_at(time_s + STEP_S);
+        let rotation_change = self.rotation(time_s - STEP_S).inverse() * self.rotation(time_s + STEP_S);
         let felt = self.derivative_m(time_s, 2) - self.gravity_in_world;
         ImuSample {
             stamp_ns: ns_from_seconds(time_s),
             angular_velocity_rad_per_s: so3::log(&rotation_change) / (2.0 * STEP_S),
-            specific_force_m_per_s2: rotation_at(time_s).inverse() * felt,
+            specific_force_m_per_s2: self.rotation(time_s).inverse() * felt,
         }
     }
 
