@@ -8,10 +8,8 @@ use super::CalibrationOptions;
 use super::bundle::{Bundle, BundleEquations};
 use super::state::{BundleEstimate, Columns};
 use crate::estimator::PoseCovariance;
+use crate::optimization::DIAGONAL_FLOOR;
 use crate::optimization::damped::{DampedOptions, DampedProblem, minimize};
-
-/// Addition to the diagonal, so that unknowns without a factor do not move.
-const FLOOR: f64 = 1e-6;
 
 #[derive(Clone, Debug)]
 pub(super) struct Adjusted {
@@ -56,7 +54,7 @@ impl DampedProblem for DampedBundle<'_> {
         let bundle = self.bundle;
         let reduced = equations.visual().eliminate_by_parts(damping);
         let (mut matrix, band, border) = bundle.assemble(equations, &reduced, std::mem::take(&mut self.memory));
-        matrix.damp(damping, FLOOR);
+        matrix.damp(damping, DIAGONAL_FLOOR);
         let factor = matrix.factor()?;
         let (band, border) = factor.solve(&band, &border)?;
         self.memory = factor.into_memory();
@@ -79,7 +77,7 @@ pub(super) fn covariances(bundle: &Bundle<'_>, estimate: &BundleEstimate, of_pos
     let equations = bundle.linearize(estimate);
     let reduced = equations.visual().eliminate_by_parts(0.0);
     let (mut matrix, _, _) = bundle.assemble(&equations, &reduced, Vec::new());
-    matrix.damp(0.0, FLOOR);
+    matrix.damp(0.0, DIAGONAL_FLOOR);
     let factor = matrix.factor()?;
     let border = factor.border_information().clone().cholesky()?.inverse();
     let poses = if of_poses {

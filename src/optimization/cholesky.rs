@@ -5,6 +5,8 @@
 use nalgebra::{DMatrix, DVector};
 use pulp::{Arch, Simd, WithSimd};
 
+/// Addition to the diagonal of an information matrix, so that unknowns without a factor do not move.
+pub(crate) const DIAGONAL_FLOOR: f64 = 1e-6;
 /// Number of columns eliminated together: velocity and biases of a frame.
 const PANEL: usize = 9;
 

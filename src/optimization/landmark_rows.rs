@@ -14,7 +14,8 @@ const LANDMARK: usize = 3;
 /// Number of columns before the blocks: landmark and residual.
 const LEADING: usize = LANDMARK + 1;
 const BLOCK: usize = 6;
-const OBSERVATION: usize = 2;
+/// Rows that an observation adds.
+pub(crate) const OBSERVATION_ROWS: usize = 2;
 /// A column of the landmark depends on the previous ones when no more than this fraction of it is independent.
 const DEPENDENT: f64 = 1e-12;
 
@@ -62,7 +63,7 @@ impl LandmarkRows {
     pub(crate) fn push<const N: usize>(&mut self, term: &BlockTerm<usize, N>) {
         let observers = self.blocks.len();
         self.blocks.extend(term.observer.iter().flatten().map(|(block, _)| *block));
-        for axis in 0..OBSERVATION {
+        for axis in 0..OBSERVATION_ROWS {
             let begin = self.entries.len();
             self.entries.resize(begin + self.width, 0.0);
             let row = &mut self.entries[begin..];
@@ -86,7 +87,7 @@ impl LandmarkRows {
             }
         }
         let height = self.entries.len() / self.width;
-        self.added.push(AddedRows { rows: height - OBSERVATION..height, blocks: self.blocks.len() });
+        self.added.push(AddedRows { rows: height - OBSERVATION_ROWS..height, blocks: self.blocks.len() });
     }
 
     /// Last block of the newest observation, `None` if only the anchor has been added.

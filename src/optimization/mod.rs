@@ -21,10 +21,10 @@ mod tests;
 mod triangulation;
 
 pub(crate) use block_term::{BlockTerm, PoseBlocksOf};
-pub(crate) use cholesky::Cholesky;
+pub(crate) use cholesky::{Cholesky, DIAGONAL_FLOOR};
 pub(crate) use landmark::Landmark;
 pub use landmark::LandmarkModel;
-pub(crate) use landmark_rows::LandmarkRows;
+pub(crate) use landmark_rows::{LandmarkRows, OBSERVATION_ROWS};
 pub(crate) use pose_blocks::PoseBlocks;
 pub(crate) use reprojection::{CameraPose, RelativePose, RelativePoses, Reprojection};
 pub(crate) use robust_loss::LossSum;

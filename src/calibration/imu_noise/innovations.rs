@@ -15,13 +15,11 @@ use std::ops::Range;
 use nalgebra::DMatrix;
 
 use crate::estimator::{FactorRows, FrameId, JacobianFactor, StepReport};
-use crate::optimization::Cholesky;
+use crate::optimization::{Cholesky, DIAGONAL_FLOOR};
 use crate::text::Named;
 
 /// Number of rows of an IMU factor.
 const ROWS: usize = 15;
-/// Addition to the diagonal of the information, as in the solver, so that unknowns without a factor do not move.
-const FLOOR: f64 = 1e-6;
 /// Number of frames at either end of a window that are excluded because they are less certain.
 const EDGE_FRAMES: usize = 3;
 
@@ -111,7 +109,7 @@ impl Innovations {
         let mut information = linearization.jacobian.tr_mul(&linearization.jacobian);
         information += linearization.prior_jacobian.tr_mul(&linearization.prior_jacobian);
         for column in 0..columns {
-            information[(column, column)] += FLOOR;
+            information[(column, column)] += DIAGONAL_FLOOR;
         }
         let cholesky = Cholesky::new(&information)?;
         for slot in unseen {

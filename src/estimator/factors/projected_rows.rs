@@ -6,12 +6,10 @@ use nalgebra::{DMatrix, DVector};
 use super::reprojection::{Anchor, VisualFactors, whitened};
 use crate::estimator::state::camera_view::{CameraView, ROLLING_BLOCKS};
 use crate::geometry::triangular_factor::{PORTION, TriangularFactor};
-use crate::optimization::{LandmarkRows, PoseBlocks};
+use crate::optimization::{LandmarkRows, OBSERVATION_ROWS, PoseBlocks};
 
 /// Columns of a block of the camera: a pose, or its intrinsics.
 const BLOCK: usize = 6;
-/// Rows that an observation adds.
-const OBSERVATION: usize = 2;
 
 /// Whitened rows of some tracks.
 #[derive(Clone, Debug)]
@@ -50,7 +48,7 @@ impl ProjectedRows {
         };
         let mut heights = vec![0; frames];
         for observation in tracks.iter().flat_map(|track| &track.observations) {
-            heights[newest - observation.slot] += OBSERVATION;
+            heights[newest - observation.slot] += OBSERVATION_ROWS;
         }
         let capacity = |(begin, height)| Vec::with_capacity(height * (columns - BLOCK * N * begin));
         let mut groups: Vec<Vec<f64>> = heights.into_iter().enumerate().map(capacity).collect();

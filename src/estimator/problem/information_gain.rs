@@ -20,7 +20,7 @@ use crate::estimator::state::estimate::Estimate;
 use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::state::layout::Layout;
 use crate::geometry::seconds_from_ns;
-use crate::optimization::Cholesky;
+use crate::optimization::{Cholesky, DIAGONAL_FLOOR};
 
 /// Motion of the IMU along or about one of its axes, or of a joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -100,9 +100,6 @@ impl InformationGain {
     }
 }
 
-/// Addition to the diagonals, as in the solver, so that unknowns without a factor do not move.
-const FLOOR: f64 = 1e-6;
-
 /// Relative decrease of the variance below which a gain is a rounding error.
 const ROUNDING: f64 = 1e-10;
 
@@ -143,7 +140,7 @@ impl Answer {
         let mut order = layout.elimination_order();
         order.truncate(layout.calibration().start);
         order.extend_from_slice(free);
-        let factor = Cholesky::ordered(hessian, order, |diagonal| diagonal + FLOOR)?;
+        let factor = Cholesky::ordered(hessian, order, |diagonal| diagonal + DIAGONAL_FLOOR)?;
         let mut response = factor.leading_response(free.len(), hessian.nrows());
         for (index, column) in free.iter().enumerate() {
             response[(*column, index)] = 1.0;

@@ -10,8 +10,8 @@ use crate::estimator::factors::costs::Costs;
 use crate::estimator::factors::reprojection::ReducedVisualEquations;
 use crate::estimator::state::estimate::Estimate;
 use crate::estimator::state::layout::Layout;
-use crate::optimization::Cholesky;
 use crate::optimization::damped::{DampedOptions, DampedProblem, Iteration, minimize};
+use crate::optimization::{Cholesky, DIAGONAL_FLOOR};
 
 /// One iteration of the solver.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,8 +56,6 @@ impl Solution {
     }
 }
 
-/// Addition to the diagonal, so that unknowns without a factor do not move.
-const FLOOR: f64 = 1e-6;
 /// Marquardt's λ of a solve until a step raises the cost: no more than rounding requires.
 ///
 /// It multiplies the information about an unknown while all others are fixed. The features of a window determine a
@@ -199,7 +197,7 @@ pub(crate) fn factor(layout: &Layout, information: &DMatrix<f64>) -> Option<Chol
 
 /// Entry of the diagonal with λ = `damping`.
 fn with_floor(diagonal: f64, damping: f64) -> f64 {
-    diagonal + (damping * diagonal + FLOOR)
+    diagonal + (damping * diagonal + DIAGONAL_FLOOR)
 }
 
 impl DampedProblem for DampedWindow<'_> {

@@ -10,7 +10,7 @@ use crate::estimator::state::frame;
 use crate::estimator::state::frame_state::{FrameState, Rates};
 use crate::geometry::seconds_from_ns;
 use crate::gimbal::ParameterId;
-use crate::optimization::Cholesky;
+use crate::optimization::{Cholesky, DIAGONAL_FLOOR};
 use crate::sensors::ImuSample;
 
 /// Duration of the motion after a stamp that frames of the window take from the IMU samples before the next frame, in
@@ -106,7 +106,7 @@ impl WindowState {
         };
         let mut order = problem.layout.elimination_order();
         order.retain(estimated);
-        let Some(factor) = Cholesky::ordered(&hessian, order.clone(), |diagonal| diagonal + FLOOR) else {
+        let Some(factor) = Cholesky::ordered(&hessian, order.clone(), |diagonal| diagonal + DIAGONAL_FLOOR) else {
             return Vec::new();
         };
         let step = -factor.solve(&gradient);
@@ -118,13 +118,10 @@ impl WindowState {
                 // The lower triangle is stored.
                 coupling[*row] = hessian[(column.max(*row), column.min(*row))];
             }
-            let information = hessian[(column, column)] + FLOOR - coupling.dot(&factor.solve(&coupling));
+            let information = hessian[(column, column)] + DIAGONAL_FLOOR - coupling.dot(&factor.solve(&coupling));
             let change = -(gradient[column] + coupling.dot(&step)) / information;
             (information > 0.0).then_some(SuspectedParameter { parameter: *parameter, change, information })
         };
         tried.filter_map(score).collect()
     }
 }
-
-/// Addition to the diagonal, as in the solver, so that unknowns without a factor do not move.
-const FLOOR: f64 = 1e-6;
