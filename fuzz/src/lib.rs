@@ -6,7 +6,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 use dcvins::export::{self, EvaluationOptions};
 use dcvins::flight_log::convert::convert;
@@ -72,28 +72,33 @@ pub fn log(bytes: &[u8]) {
     read_log(&write(&folder.path().join("input.mcap"), bytes));
 }
 
+/// Rig of the seeds, and the same rig with each of [`SOURCES`]: parsed once, since that takes longer than most inputs.
+static RIGS: LazyLock<(Rig, Vec<Rig>)> = LazyLock::new(|| {
+    let parsed = |text: &str| Rig::from_yaml(text, Path::new("rig.yaml")).expect("the rigs of the seeds are valid");
+    (parsed(RIG), SOURCES.iter().map(|source| parsed(&rig_with_source(source))).collect())
+});
+
 fn read_log(path: &Path) {
     let Ok(log) = FlightLog::open(path).map(Arc::new) else { return };
     let own = Rig::for_log(&log, None);
     drop(log_check::check(&log, own.as_ref(), &[]));
-    let rig = Rig::from_yaml(RIG, Path::new("rig.yaml")).expect("the rig of the seeds is valid");
+    let (rig, with_sources) = &*RIGS;
     for camera in &rig.cameras {
-        if let Ok(frames) = FrameStream::new(Arc::clone(&log), &rig, &camera.key, 0.0, None) {
+        if let Ok(frames) = FrameStream::new(Arc::clone(&log), rig, &camera.key, 0.0, None) {
             frames.take(MAX_READ).for_each(drop);
         }
     }
-    for source in SOURCES {
-        let rig = Rig::from_yaml(&rig_with_source(source), Path::new("rig.yaml")).expect("the source is valid");
+    for rig in with_sources {
         let topic = rig.gimbal.as_ref().and_then(|gimbal| gimbal.topic.as_deref());
         if topic.is_some_and(|topic| log.topic(topic).is_none()) {
             continue;
         }
-        drop(log_check::check(&log, Ok(&rig), &[]));
-        if let Ok(frames) = FrameStream::new(Arc::clone(&log), &rig, "cam0", 0.0, None) {
+        drop(log_check::check(&log, Ok(rig), &[]));
+        if let Ok(frames) = FrameStream::new(Arc::clone(&log), rig, "cam0", 0.0, None) {
             frames.take(MAX_READ).for_each(drop);
         }
     }
-    let images = ImageReader::new(Arc::clone(&log), &rig);
+    let images = ImageReader::new(Arc::clone(&log), rig);
     for camera in &rig.cameras {
         for index in 0..images.count(&camera.key).min(MAX_READ) {
             drop(images.image(&camera.key, index));
