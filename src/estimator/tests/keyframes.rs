@@ -22,9 +22,9 @@ struct Keyframe {
 }
 
 /// Keyframes of a flight whose chain is given with errors of rotation up to a bound.
-fn keyframes(rotation_bound_rad: f64, use_encoder: bool, options: SyntheticOptions) -> Vec<Keyframe> {
+fn keyframes(rotation_bound_rad: f64, use_encoder: bool, options: &SyntheticOptions) -> Vec<Keyframe> {
     let start_error = ChainPrior { translation_bound_m: 0.01, rotation_bound_rad };
-    let flight = synthetic_tracks(&SyntheticOptions { start_error, ..options });
+    let flight = synthetic_tracks(&SyntheticOptions { start_error, ..options.clone() });
     let config = fixture::config(&flight.given_rig, Parameterization::Minimal, EstimatorOptions::default());
     let mut estimator = Estimator::new(EstimatorConfig { use_encoder, ..config });
     let (mut keyframes, mut newest_s, mut is_of_first_window) = (Vec::new(), 0.0, true);
@@ -46,7 +46,7 @@ fn keyframes(rotation_bound_rad: f64, use_encoder: bool, options: SyntheticOptio
 fn moving_joints_make_keyframes_where_rotations_of_the_chain_are_inaccurate() {
     // A vehicle that stands still from 4.5 s on, whose images have no parallax, while a joint swings by 15°.
     let by_joints = |rotation_bound_rad: f64, use_encoder: bool| -> Vec<f64> {
-        let keyframes = keyframes(rotation_bound_rad, use_encoder, fixture::joint_swing(0, 12.0));
+        let keyframes = keyframes(rotation_bound_rad, use_encoder, &fixture::joint_swing(0, 12.0));
         let by_joints = keyframes.iter().filter(|keyframe| keyframe.reason.contains("a joint has moved"));
         by_joints.map(|keyframe| keyframe.since_last_s).collect()
     };
@@ -61,7 +61,8 @@ fn moving_joints_make_keyframes_where_rotations_of_the_chain_are_inaccurate() {
 fn keyframes_of_the_first_window_of_an_inaccurate_chain_are_apart() {
     // Number of keyframes by parallax within the interval, in the first window and later.
     let early = |rotation_bound_rad: f64| {
-        let keyframes = keyframes(rotation_bound_rad, true, SyntheticOptions { duration_s: 9.0, ..Default::default() });
+        let options = SyntheticOptions { duration_s: 9.0, ..SyntheticOptions::default() };
+        let keyframes = keyframes(rotation_bound_rad, true, &options);
         let is_early = |keyframe: &&Keyframe| {
             keyframe.reason.contains("parallax") && keyframe.since_last_s < FIRST_KEYFRAME_INTERVAL_S
         };
