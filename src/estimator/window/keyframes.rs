@@ -116,8 +116,8 @@ impl WindowState {
         let limit = options.keyframe_parallax_rad;
         let chosen = parallax >= limit;
         let age_s = self.age_s(last);
-        let is_first_window = self.prior.is_none() && self.calibration.leads_inaccurately();
-        if chosen && is_first_window && age_s < FIRST_KEYFRAME_INTERVAL_S {
+        let is_spaced = self.prior.is_none() && self.calibration.leads_inaccurately();
+        if chosen && is_spaced && age_s < FIRST_KEYFRAME_INTERVAL_S {
             let message = format!(
                 "no keyframe: {age_s:.2} s since the last one (at least {FIRST_KEYFRAME_INTERVAL_S} s in the first \
                  window of an inaccurate chain)"

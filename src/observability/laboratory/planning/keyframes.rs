@@ -1,4 +1,5 @@
-//! Keyframes of a planned motion, by the rule of the estimator.
+//! Keyframes of a planned motion, by the rule of the estimator without its shortest interval in the first window of an
+//! inaccurate chain.
 
 use nalgebra::{Vector2, Vector3};
 
