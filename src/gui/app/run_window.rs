@@ -60,7 +60,13 @@ pub fn run_window(options: WindowOptions) -> Result<(), WindowError> {
         .with_icon(icon())
         .with_drag_and_drop(true);
     let viewport = kept.place.of(viewport);
-    let native = eframe::NativeOptions { viewport, system_font_fallback: false, ..eframe::NativeOptions::default() };
+    // Colors have eight bits already, and a CPU adapter would compute the noise of every pixel.
+    let native = eframe::NativeOptions {
+        viewport,
+        system_font_fallback: false,
+        dithering: false,
+        ..eframe::NativeOptions::default()
+    };
     let start = move || {
         eframe::run_native(
             "dcvins",
@@ -104,10 +110,11 @@ fn arrange_drawing(state: Option<&eframe::egui_wgpu::RenderState>, context: &egu
         Some(state) if state.adapter.get_info().device_type != wgpu::DeviceType::Cpu => {
             SceneBackend::Wgpu(state.target_format).set(context);
         }
-        _ => {
+        Some(state) => {
             SceneBackend::Cpu.set(context);
-            context.add_plugin(SoftwareWindow::default());
+            context.add_plugin(SoftwareWindow::new(state.target_format));
         }
+        None => SceneBackend::Cpu.set(context),
     }
 }
 

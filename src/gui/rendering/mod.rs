@@ -7,5 +7,6 @@ mod mixing;
 pub mod offscreen;
 pub mod painter;
 mod pdf;
+pub(in crate::gui) mod picture_copy;
 mod svg;
 mod vector;

@@ -11,6 +11,7 @@ use wgpu::util::DeviceExt as _;
 
 use super::layout::{Corner, Disc, ImageCorner, SceneDrawing, Segment};
 use super::pipelines::{COLOR_FORMAT, DEPTH_FORMAT, PipelineMaker, SAMPLES};
+use crate::gui::rendering::picture_copy::PictureCopy;
 use crate::sensors::GrayImage;
 
 /// Vertices of the two triangles of a segment.
@@ -67,10 +68,10 @@ struct SceneRenderer {
     face_pipeline: wgpu::RenderPipeline,
     segment_pipeline: wgpu::RenderPipeline,
     disc_pipeline: wgpu::RenderPipeline,
-    copy_pipeline: wgpu::RenderPipeline,
+    copy: PictureCopy,
     uniform_layout: wgpu::BindGroupLayout,
     texture_layout: wgpu::BindGroupLayout,
-    linear: wgpu::Sampler,
+    nearest: wgpu::Sampler,
     canvases: egui::IdMap<Canvas>,
 }
 
@@ -104,7 +105,7 @@ impl SceneRenderer {
             }],
         });
         let texture_layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("scene texture"),
+            label: Some("scene image"),
             entries: &[
                 wgpu::BindGroupLayoutEntry {
                     binding: 0,
@@ -128,7 +129,6 @@ impl SceneRenderer {
             PipelineMaker { device, shader: &shader, uniform_layout: &uniform_layout, texture_layout: &texture_layout };
         let per_instance = wgpu::VertexStepMode::Instance;
         let per_vertex = wgpu::VertexStepMode::Vertex;
-        let copy_fragment = if target_format.is_srgb() { "copy_linear" } else { "copy_gamma" };
         Self {
             image_pipeline: pipelines.scene(
                 ["image_vertex", "image_fragment"],
@@ -162,10 +162,10 @@ impl SceneRenderer {
                     attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32, 2 => Unorm8x4],
                 }),
             ),
-            copy_pipeline: pipelines.copy(copy_fragment, target_format),
+            copy: PictureCopy::new(device, target_format),
             uniform_layout,
             texture_layout,
-            linear: device.create_sampler(&wgpu::SamplerDescriptor {
+            nearest: device.create_sampler(&wgpu::SamplerDescriptor {
                 label: Some("scene image"),
                 mag_filter: wgpu::FilterMode::Nearest,
                 min_filter: wgpu::FilterMode::Nearest,
@@ -192,7 +192,7 @@ impl SceneRenderer {
         }
         let mut canvas = old
             .filter(|canvas| canvas.size_px == drawing.size_px)
-            .unwrap_or_else(|| Canvas::new(device, drawing, &self.texture_layout, &self.linear));
+            .unwrap_or_else(|| Canvas::new(device, drawing, &self.copy));
         canvas.drawing = Arc::clone(drawing);
         self.draw(device, queue, encoder, &canvas);
         self.canvases.insert(id, canvas);
@@ -290,26 +290,26 @@ impl SceneRenderer {
             &image.pixels[..image.width * image.height],
         );
         let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-        Some(texture_group(device, &self.texture_layout, &view, &self.linear))
+        Some(device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("scene image"),
+            layout: &self.texture_layout,
+            entries: &[
+                wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(&view) },
+                wgpu::BindGroupEntry { binding: 1, resource: wgpu::BindingResource::Sampler(&self.nearest) },
+            ],
+        }))
     }
 
     /// Copies a prepared view into egui's pass.
     fn copy(&self, pass: &mut wgpu::RenderPass<'static>, id: egui::Id) {
         if let Some(canvas) = self.canvases.get(&id) {
-            pass.set_pipeline(&self.copy_pipeline);
-            pass.set_bind_group(0, &canvas.copy_group, &[]);
-            pass.draw(0..3, 0..1);
+            self.copy.draw(pass, &canvas.copy_group);
         }
     }
 }
 
 impl Canvas {
-    fn new(
-        device: &wgpu::Device,
-        drawing: &Arc<SceneDrawing>,
-        texture_layout: &wgpu::BindGroupLayout,
-        sampler: &wgpu::Sampler,
-    ) -> Self {
+    fn new(device: &wgpu::Device, drawing: &Arc<SceneDrawing>, copy: &PictureCopy) -> Self {
         let size_px = drawing.size_px;
         let target = |label, format, sample_count, usage| {
             let texture = device.create_texture(&wgpu::TextureDescriptor {
@@ -331,24 +331,8 @@ impl Canvas {
             size_px,
             samples: target("scene samples", COLOR_FORMAT, SAMPLES, attachment),
             depth: target("scene depth", DEPTH_FORMAT, SAMPLES, attachment),
-            copy_group: texture_group(device, texture_layout, &resolved, sampler),
+            copy_group: copy.group(device, &resolved),
             resolved,
         }
     }
-}
-
-fn texture_group(
-    device: &wgpu::Device,
-    layout: &wgpu::BindGroupLayout,
-    view: &wgpu::TextureView,
-    sampler: &wgpu::Sampler,
-) -> wgpu::BindGroup {
-    device.create_bind_group(&wgpu::BindGroupDescriptor {
-        label: Some("scene texture"),
-        layout,
-        entries: &[
-            wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(view) },
-            wgpu::BindGroupEntry { binding: 1, resource: wgpu::BindingResource::Sampler(sampler) },
-        ],
-    })
 }

@@ -54,34 +54,4 @@ impl PipelineMaker<'_> {
             cache: None,
         })
     }
-
-    /// A pipeline that copies the finished scene into egui's pass.
-    pub(super) fn copy(&self, fragment: &str, target_format: wgpu::TextureFormat) -> wgpu::RenderPipeline {
-        let layout = self.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some("scene copy"),
-            bind_group_layouts: &[Some(self.texture_layout)],
-            immediate_size: 0,
-        });
-        self.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some("scene copy"),
-            layout: Some(&layout),
-            vertex: wgpu::VertexState {
-                module: self.shader,
-                entry_point: Some("copy_vertex"),
-                buffers: &[],
-                compilation_options: wgpu::PipelineCompilationOptions::default(),
-            },
-            primitive: wgpu::PrimitiveState::default(),
-            depth_stencil: None,
-            multisample: wgpu::MultisampleState::default(),
-            fragment: Some(wgpu::FragmentState {
-                module: self.shader,
-                entry_point: Some(fragment),
-                targets: &[Some(target_format.into())],
-                compilation_options: wgpu::PipelineCompilationOptions::default(),
-            }),
-            multiview_mask: None,
-            cache: None,
-        })
-    }
 }
