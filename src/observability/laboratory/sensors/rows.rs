@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, Vector3};
 
-use super::propagation::{Change, IMU_COLUMNS};
+use super::propagation::{Change, IMU_COLUMNS, ReadoutChanges};
 use super::state::SensorState;
 use super::values::{ACCELEROMETER, GYROSCOPE, INTRINSICS};
 use super::window::{Prediction, SensorObservation, SensorWindow};
@@ -57,8 +57,9 @@ impl SensorWindow<'_> {
     /// Rows of every factor at a state; `None` when a landmark is behind a camera that observed it.
     pub(super) fn rows(&self, state: &SensorState) -> Option<Vec<SensorRows>> {
         let mut rows = Vec::new();
+        let changes = self.readout_changes(state);
         for (position, observations) in state.landmarks.iter().zip(&self.observations) {
-            rows.push(self.landmark_rows(state, position, observations)?);
+            rows.push(self.landmark_rows(state, &changes, position, observations)?);
         }
         if let JointKnowledge::Encoder(sigma_rad) = self.setup.joints {
             rows.extend((0..state.frames.len()).map(|frame| self.encoder_rows(state, frame, sigma_rad)));
@@ -77,12 +78,13 @@ impl SensorWindow<'_> {
     fn landmark_rows(
         &self,
         state: &SensorState,
+        changes: &[ReadoutChanges],
         position: &Vector3<f64>,
         observations: &[SensorObservation],
     ) -> Option<SensorRows> {
         let mut rows = SensorRows::zeros(2 * observations.len(), self.columns.count(), 3);
         for (index, observation) in observations.iter().enumerate() {
-            let prediction = self.predict(state, position, observation.frame, observation.row_ratio)?;
+            let prediction = self.predict(state, changes, position, observation.frame, observation.row_ratio)?;
             let residual = (prediction.uv_px - observation.uv_px) / PIXEL_SIGMA_PX;
             rows.residual.rows_mut(2 * index, 2).copy_from(&residual);
             rows.by_landmark.rows_mut(2 * index, 2).copy_from(&(prediction.by_landmark / PIXEL_SIGMA_PX));
@@ -155,7 +157,7 @@ impl SensorWindow<'_> {
         self.times_s
             .windows(2)
             .map(|times| Change::integrate(&measured, interval(times), &self.truth.sensors, &biases, Some(&noise)))
-            .map(|change| whitening(&change.covariance))
+            .map(|change| whitening(&change.covariance.unwrap_or_default()))
             .collect()
     }
 

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2xX, Matrix3, SMatrix, Vector2, Vector3};
 
 use super::columns::{SensorColumns, all_parameters};
-use super::propagation::{Change, IMU_COLUMNS, Measured};
+use super::propagation::{IMU_COLUMNS, Measured, ReadoutChanges};
 use super::state::{Columns, SensorFrameState, SensorState};
 use super::values::SensorValues;
 use crate::estimator::{HypotheticalFrame, JointKnowledge, NavigationState, PoseKnowledge};
@@ -128,6 +128,7 @@ impl<'a> SensorWindow<'a> {
             camera_imu: None,
         };
         let frames: Vec<HypotheticalFrame> = self.truth.frames.iter().zip(&self.times_s).map(hypothetical).collect();
+        let changes = self.readout_changes(&self.truth);
         for landmark in self.setup.landmarks_of(&frames) {
             let anchor = &self.truth.frames[landmark.anchor];
             let world_from_camera =
@@ -135,7 +136,7 @@ impl<'a> SensorWindow<'a> {
             let position = world_from_camera.transform(&(landmark.bearing / landmark.inverse_distance_per_m));
             let observers = [landmark.anchor].into_iter().chain(landmark.observers.iter().copied());
             let mut observations: Vec<SensorObservation> =
-                observers.filter_map(|frame| self.observation(&position, frame, height)).collect();
+                observers.filter_map(|frame| self.observation(&changes, &position, frame, height)).collect();
             if observations.len() > 1 {
                 observations.sort_by_key(|it| it.frame);
                 self.truth.landmarks.push(position);
@@ -145,7 +146,13 @@ impl<'a> SensorWindow<'a> {
     }
 
     /// Observation of a position in one frame; `None` outside the image.
-    fn observation(&self, position: &Vector3<f64>, frame: usize, height: f64) -> Option<SensorObservation> {
+    fn observation(
+        &self,
+        changes: &[ReadoutChanges],
+        position: &Vector3<f64>,
+        frame: usize,
+        height: f64,
+    ) -> Option<SensorObservation> {
         let readout_s = self.truth.sensors.readout_s;
         let mut row_ratio = 0.5;
         for _ in 0..ROW_ITERATIONS {
@@ -159,7 +166,7 @@ impl<'a> SensorWindow<'a> {
                 break;
             }
         }
-        let uv_px = self.predict(&self.truth, position, frame, row_ratio)?.uv_px;
+        let uv_px = self.predict(&self.truth, changes, position, frame, row_ratio)?.uv_px;
         self.truth.sensors.camera.contains(&uv_px, 0.0).then_some(SensorObservation { frame, uv_px, row_ratio })
     }
 
@@ -176,17 +183,32 @@ impl<'a> SensorWindow<'a> {
         self.truth.sensors.measure(&rate, &force).expect("the true corrections of an experiment are invertible")
     }
 
+    /// Changes of the IMU within the readout of each frame at a state; none where poses are known.
+    pub(super) fn readout_changes(&self, state: &SensorState) -> Vec<ReadoutChanges> {
+        if self.setup.poses == PoseKnowledge::Known {
+            return Vec::new();
+        }
+        let measured = |time_s: f64| self.measured(time_s);
+        let longest_s = state.sensors.timeshift_s + state.sensors.readout_s;
+        let of_frame = |(time_s, frame): (&f64, &SensorFrameState)| {
+            ReadoutChanges::new(&measured, (*time_s, longest_s), &state.sensors, &frame.navigation.bias)
+        };
+        self.times_s.iter().zip(&state.frames).map(of_frame).collect()
+    }
+
     /// Predicted pixel of a position in a frame, at the row in which it was observed; `None` behind the camera.
+    /// `changes` are those of [`Self::readout_changes`].
     pub(super) fn predict(
         &self,
         state: &SensorState,
+        changes: &[ReadoutChanges],
         position: &Vector3<f64>,
         frame: usize,
         row_ratio: f64,
     ) -> Option<Prediction> {
         let sensors = &state.sensors;
         let since_s = sensors.timeshift_s + row_ratio * sensors.readout_s;
-        let exposure = self.exposure(state, frame, since_s);
+        let exposure = self.exposure(state, changes, frame, since_s);
         let joints = self.joints_at(state, frame, since_s, row_ratio);
         let chain = state.chain.linearize(&joints.angles_rad);
         let imu_from_camera = chain.imu_from_camera;
@@ -225,7 +247,7 @@ impl<'a> SensorWindow<'a> {
         })
     }
 
-    fn exposure(&self, state: &SensorState, frame: usize, since_s: f64) -> Exposure {
+    fn exposure(&self, state: &SensorState, changes: &[ReadoutChanges], frame: usize, since_s: f64) -> Exposure {
         let time_s = self.times_s[frame];
         if self.setup.poses == PoseKnowledge::Known {
             let kinematics = self.flight.kinematics(time_s + since_s);
@@ -241,7 +263,7 @@ impl<'a> SensorWindow<'a> {
         }
         let NavigationState { world_from_imu, velocity_m_per_s, bias } = &state.frames[frame].navigation;
         let measured = |time_s: f64| self.measured(time_s);
-        let change = Change::integrate(&measured, (time_s, since_s), &state.sensors, bias, None);
+        let change = changes[frame].after(&measured, since_s, &state.sensors, bias);
         let rotation = world_from_imu.rotation_matrix();
         let gravity = self.flight.gravity_in_world;
         let (rate, _) = state.sensors.correct_rate(&measured(time_s + since_s).0);
