@@ -60,7 +60,7 @@ pub fn run_window(options: WindowOptions) -> Result<(), WindowError> {
         .with_icon(icon())
         .with_drag_and_drop(true);
     let viewport = kept.place.of(viewport);
-    // Colors have eight bits already, and a CPU adapter would compute the noise of every pixel.
+    // Colours have eight bits already, and a CPU adapter would compute the noise of every pixel.
     let native = eframe::NativeOptions {
         viewport,
         system_font_fallback: false,

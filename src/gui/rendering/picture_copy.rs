@@ -69,7 +69,12 @@ impl PictureCopy {
         Self { pipeline, layout, sampler }
     }
 
-    /// Bind group of a picture with colours in sRGB.
+    /// Layout of [`Self::group`], also for other pipelines that show pictures.
+    pub(in crate::gui) fn layout(&self) -> &wgpu::BindGroupLayout {
+        &self.layout
+    }
+
+    /// Bind group of a picture, without interpolation between its pixels.
     pub(in crate::gui) fn group(&self, device: &wgpu::Device, picture: &wgpu::TextureView) -> wgpu::BindGroup {
         device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("copy"),

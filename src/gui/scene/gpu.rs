@@ -70,8 +70,6 @@ struct SceneRenderer {
     disc_pipeline: wgpu::RenderPipeline,
     copy: PictureCopy,
     uniform_layout: wgpu::BindGroupLayout,
-    texture_layout: wgpu::BindGroupLayout,
-    nearest: wgpu::Sampler,
     canvases: egui::IdMap<Canvas>,
 }
 
@@ -104,29 +102,9 @@ impl SceneRenderer {
                 count: None,
             }],
         });
-        let texture_layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("scene image"),
-            entries: &[
-                wgpu::BindGroupLayoutEntry {
-                    binding: 0,
-                    visibility: wgpu::ShaderStages::FRAGMENT,
-                    ty: wgpu::BindingType::Texture {
-                        sample_type: wgpu::TextureSampleType::Float { filterable: true },
-                        view_dimension: wgpu::TextureViewDimension::D2,
-                        multisampled: false,
-                    },
-                    count: None,
-                },
-                wgpu::BindGroupLayoutEntry {
-                    binding: 1,
-                    visibility: wgpu::ShaderStages::FRAGMENT,
-                    ty: wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering),
-                    count: None,
-                },
-            ],
-        });
+        let copy = PictureCopy::new(device, target_format);
         let pipelines =
-            PipelineMaker { device, shader: &shader, uniform_layout: &uniform_layout, texture_layout: &texture_layout };
+            PipelineMaker { device, shader: &shader, uniform_layout: &uniform_layout, texture_layout: copy.layout() };
         let per_instance = wgpu::VertexStepMode::Instance;
         let per_vertex = wgpu::VertexStepMode::Vertex;
         Self {
@@ -162,15 +140,8 @@ impl SceneRenderer {
                     attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32, 2 => Unorm8x4],
                 }),
             ),
-            copy: PictureCopy::new(device, target_format),
+            copy,
             uniform_layout,
-            texture_layout,
-            nearest: device.create_sampler(&wgpu::SamplerDescriptor {
-                label: Some("scene image"),
-                mag_filter: wgpu::FilterMode::Nearest,
-                min_filter: wgpu::FilterMode::Nearest,
-                ..wgpu::SamplerDescriptor::default()
-            }),
             canvases: egui::IdMap::default(),
         }
     }
@@ -290,14 +261,7 @@ impl SceneRenderer {
             &image.pixels[..image.width * image.height],
         );
         let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-        Some(device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("scene image"),
-            layout: &self.texture_layout,
-            entries: &[
-                wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(&view) },
-                wgpu::BindGroupEntry { binding: 1, resource: wgpu::BindingResource::Sampler(&self.nearest) },
-            ],
-        }))
+        Some(self.copy.group(device, &view))
     }
 
     /// Copies a prepared view into egui's pass.
