@@ -1,317 +1,37 @@
-//! Checks of a log and its rig that need no estimator: topics, timing, IMU, encoders, images, intrinsics and
-//! extrinsics, each finding with its evidence and remedy.
+//! Checks of a log and its rig that need no estimator, each finding with its evidence and remedy.
+//!
+//! `check.rs` calls the checks of the folders in their order. The ground floor is `report/` (findings), `survey/` (values
+//! of all messages) and the loose files that import no folder; the folders of single subjects are built on it.
 
-mod attitude;
+mod check;
 mod clock_alignment;
-mod clocks;
-mod copies;
 mod correction;
-mod frozen_joints;
-mod gimbal_imu;
-mod gradient_sums;
+mod extrinsics;
+mod gimbal;
 mod ground_truth;
-mod hand_eye;
 mod hypotheses;
-mod image_measure;
 mod images;
-mod imu_axes;
-mod imu_facts;
-mod imu_noise;
-mod imu_samples;
-mod imu_topics;
-mod joint_coverage;
-mod joints;
+mod imu;
 mod measured_fault;
 mod noise;
 mod permutations;
-mod pictures;
-mod placed_forces;
-mod publishers;
-mod readout;
-mod render;
 mod report;
 mod rig_sanity;
-mod rotation;
-mod rotation_data;
-mod rotation_fit;
-#[cfg(test)]
-mod rotation_tests;
-mod source_fit;
-mod spectrum;
-mod stationary;
+mod rotations;
+mod stamps;
 mod statistics;
-mod still_pixels;
 mod survey;
 #[cfg(test)]
 mod tests;
-mod timing;
-mod topic_survey;
-mod unmeasured;
-mod used_topics;
-mod vehicle_attitude;
-mod verdict;
+mod topics;
 
+pub use self::check::check;
 pub use self::clock_alignment::{
     AlignmentError, AlignmentReference, ClockAlignment, RotationReference, align_camera, align_clocks,
 };
-
+pub use self::measured_fault::{FaultySource, MeasuredFault};
 pub use self::noise::{
     AllanPoint, AllanReport, AxisNoise, GivenNoise, NoiseTerm, NoiseTerms, SensorNoise, measure_noise,
 };
-
-pub use self::measured_fault::{FaultySource, MeasuredFault};
-pub use self::verdict::{Usability, Verdict};
-
+pub use self::report::verdict::{Usability, Verdict};
 pub use self::report::{Area, CheckReport, Finding, ImageRotation, ProposedMask, Severity, TopicReport};
-
-use self::report::{Findings, Measurement};
-use self::survey::Survey;
-use crate::flight_log::attitude::{VEHICLE_KINDS, gimbal_kinds, topic_field};
-use crate::flight_log::topic_info::nothing_read;
-use crate::flight_log::{FlightLog, LogError, MessageKind, TopicInfo, WarningKind};
-use crate::geometry::seconds_from_ns;
-use crate::sensors::Rig;
-
-/// Checks an entire log against its rig.
-///
-/// An error of reading the rig becomes a finding, and the checks that need no rig are run.
-/// `image_rotations` are optional: with them the extrinsic rotations and the time offset of the cameras are checked
-/// against the gyroscope, and their readouts are measured.
-pub fn check(log: &FlightLog, rig: Result<&Rig, &LogError>, image_rotations: &[ImageRotation]) -> CheckReport {
-    let mut survey = Survey::of(log, rig.ok());
-    let mut findings = Findings::default();
-    check_file(log, &survey, rig.ok(), &mut findings);
-    match rig {
-        Ok(rig) => {
-            check_topics(log, rig, &mut findings);
-            rig_sanity::check_rig(log, rig, &mut findings);
-        }
-        Err(error) => findings.add(
-            Severity::Error,
-            Area::Log,
-            "no usable rig",
-            error.to_string(),
-            match error {
-                LogError::NoRig { .. } => {
-                    "put the rig beside the log as NAME.rig.yaml, name one with --rig, or write one with `dcvins rig new`"
-                }
-                _ => "correct the rig at the place that the error names",
-            },
-        ),
-    }
-    timing::check_timing(&survey, rig.ok(), &mut findings);
-    imu_topics::check_orientation_topics(log, rig, &mut findings);
-    let imu_facts = imu_facts::check_imu(&survey, rig.ok(), &mut findings);
-    imu_axes::check_imu_axes(&imu_facts, &mut findings);
-    let mut proposed_masks = Vec::new();
-    if let Ok(rig) = rig {
-        if let Some(fitted) = source_fit::check_source(&survey, rig, &imu_facts, image_rotations, &mut findings) {
-            // Joints and cameras are checked with the corrected attitude.
-            survey.use_source(rig, fitted.source, fitted.timeshift_s);
-        }
-        joints::check_joints(&survey, rig, &mut findings);
-        joint_coverage::check_joint_coverage(&survey, rig, &mut findings);
-        vehicle_attitude::check_vehicle_attitude(&survey, rig, &imu_facts, &mut findings);
-        pictures::check_pictures(log, &survey, rig, &mut findings);
-        images::check_images(log, &survey, rig, &imu_facts, &mut findings);
-        copies::check_image_copies(&survey, rig, &imu_facts, &mut findings);
-        frozen_joints::check_frozen_joints(&survey, rig, &imu_facts, &mut findings);
-        let turns = rotation::check_rotations(&survey, rig, &imu_facts, image_rotations, &mut findings);
-        gimbal_imu::check_gimbal_imu(&survey, rig, image_rotations, &mut findings);
-        ground_truth::check_ground_truth(log, rig, &imu_facts, &turns, &mut findings);
-        proposed_masks = still_pixels::check_still_pixels(&survey, rig, image_rotations, &mut findings);
-    }
-    let mut findings = findings.list;
-    findings.sort_by_key(|finding| (std::cmp::Reverse(finding.severity), finding.area));
-    CheckReport {
-        log: log.path().display().to_string(),
-        rig: rig.ok().map(|rig| rig.name.clone()),
-        epoch_ns: log.epoch_ns(),
-        duration_s: seconds_from_ns(log.duration_ns()),
-        topics: topic_reports(log, &survey, rig.ok()),
-        findings,
-        proposed_masks,
-    }
-}
-
-/// Reports damage to the file, unreadable messages, and topics of other types.
-fn check_file(log: &FlightLog, survey: &Survey, rig: Option<&Rig>, findings: &mut Findings) {
-    let is_used = |topic: &str| {
-        let role = role_of(topic, log.topic(topic).and_then(|info| info.kind), rig);
-        !["ignored", "intrinsics", "not in the rig"].contains(&role.as_str())
-    };
-    // The check of the stamps reports topics of the rig without any.
-    let is_known = |topic: &str| {
-        rig.is_some_and(|rig| rig.uses_log_time(topic))
-            || (is_used(topic) && survey.topics.get(topic).is_some_and(|topic| topic.has_one_stamp()))
-    };
-    for warning in log.warnings() {
-        let (area, title, remedy) = match warning.kind {
-            WarningKind::Damage => (
-                Area::Log,
-                "the file is truncated or damaged",
-                "copy the file again from the recorder; data after the damage are not used",
-            ),
-            WarningKind::Stamps if is_known(&warning.subject) => continue,
-            WarningKind::Stamps => (
-                Area::Time,
-                "the stamps of a topic are not of the log's time",
-                "set header.stamp to the time of measurement in the driver",
-            ),
-            WarningKind::Topics => (Area::Log, "topics are not read", ""),
-            WarningKind::NothingRead => {
-                let (problem, remedy) = nothing_read(log.topics());
-                findings.add(Severity::Error, Area::Log, "no topic can be read", problem, remedy);
-                continue;
-            }
-            _ => (Area::Log, "the log cannot be read completely", ""),
-        };
-        findings.add(Severity::Warning, area, title, warning.message.clone(), remedy);
-    }
-    for damage in &survey.damages {
-        let remedy = "copy the file again; the chunk is skipped and reading continues after it";
-        findings.add(Severity::Warning, Area::Log, "a chunk is damaged", damage.clone(), remedy);
-    }
-    for topic in survey.topics.values().filter(|topic| topic.unreadable > 0) {
-        let title = format!("messages of {} cannot be decoded", topic.topic);
-        let count = log.topic(&topic.topic).map_or(0, |info| info.count).max(topic.unreadable as u64);
-        let evidence = format!("{} of {count}; the first: {}", topic.unreadable, topic.first_problem);
-        findings.add(Severity::Warning, Area::Log, title, evidence, "check the recorder's message definitions");
-    }
-    for topic in survey.topics.values() {
-        let Some((count, content)) = topic.without_positions else { continue };
-        let title = format!("messages of {} have {content} but no positions", topic.topic);
-        let evidence = format!("{count} of {} messages", log.topic(&topic.topic).map_or(0, |info| info.count));
-        let remedy = "record joint positions (absolute encoder angles), or compute the angles from attitudes with \
-                      gimbal.source; velocities are not integrated";
-        findings.add(Severity::Error, Area::Encoders, title, evidence, remedy);
-    }
-    let ignored: Vec<String> =
-        log.topics().iter().filter(|info| info.kind.is_none()).map(TopicInfo::name_with_encoding).collect();
-    if !ignored.is_empty() {
-        let title = "topics of types or encodings that are not read";
-        findings.add(Severity::Note, Area::Log, title, ignored.join(", "), "");
-    }
-}
-
-const POSES: [MessageKind; 3] = [MessageKind::Odometry, MessageKind::PoseStamped, MessageKind::TransformStamped];
-
-/// Title, evidence and remedy of a topic of the rig that the log does not have in a readable form.
-fn topic_problem(log: &FlightLog, error: &LogError, kinds: &[MessageKind]) -> [String; 3] {
-    let quoted: Vec<String> = log.topics_of(kinds).iter().map(|topic| format!("'{topic}'")).collect();
-    let expected: Vec<&str> = kinds.iter().map(|kind| kind.schema_name()).collect();
-    let available = match (quoted.as_slice(), log.unread_topic_of(kinds)) {
-        ([], Some(unread)) => format!("'{}', which cannot be read: {}", unread.topic, unread.type_in_encoding()),
-        ([], None) => "none".to_owned(),
-        _ => quoted.join(", "),
-    };
-    let available = format!("the log's topics of type {} are {available}", expected.join(" or "));
-    let name = "name one of the log's topics in the rig".to_owned();
-    match error {
-        LogError::UnreadEncoding { field, topic, found, remedy, .. } => {
-            let title = format!("{field} names a topic whose messages cannot be read");
-            [title, format!("'{topic}': {found}"), (*remedy).to_owned()]
-        }
-        LogError::OtherType { field, topic, found, .. } => {
-            let title = format!("{field} names a topic with messages of another type");
-            [title, format!("'{topic}': {found}"), name]
-        }
-        LogError::MissingTopic { field, topic, .. } => {
-            [format!("{field} names a topic that is not in the log"), format!("'{topic}'; {available}"), name]
-        }
-        other => ["a topic of the rig cannot be used".to_owned(), other.to_string(), String::new()],
-    }
-}
-
-/// Checks that the log has the topics that the rig names.
-fn check_topics(log: &FlightLog, rig: &Rig, findings: &mut Findings) {
-    let mut named = 0;
-    let mut require = |field: String, topic: &str, kinds: &[MessageKind], severity| {
-        named += 1;
-        if let Err(error) = log.require_topic(&field, topic, kinds) {
-            let [title, evidence, remedy] = topic_problem(log, &error, kinds);
-            findings.add(severity, Area::Log, title, evidence, remedy);
-            named -= 1;
-        }
-    };
-    require("imu0.rostopic".into(), &rig.imu.topic, &[MessageKind::Imu], Severity::Error);
-    if let Some(topic) = &rig.imu.accelerometer_topic {
-        require("imu0.accelerometer_rostopic".into(), topic, &[MessageKind::Imu], Severity::Error);
-    }
-    if let Some(imu) = &rig.gimbal_imu {
-        require("imu1.rostopic".into(), &imu.sensor.topic, &[MessageKind::Imu], Severity::Error);
-        if let Some(topic) = &imu.sensor.accelerometer_topic {
-            require("imu1.accelerometer_rostopic".into(), topic, &[MessageKind::Imu], Severity::Error);
-        }
-    }
-    for camera in &rig.cameras {
-        require(format!("{}.rostopic", camera.key), &camera.topic, &MessageKind::IMAGES, Severity::Error);
-    }
-    if let Some(gimbal) = &rig.gimbal
-        && let Some(topic) = &gimbal.topic
-    {
-        require(topic_field(gimbal).into(), topic, gimbal_kinds(gimbal), Severity::Error);
-    }
-    if let Some(topic) = rig.vehicle_topic() {
-        require("gimbal.source.vehicle".into(), topic, &VEHICLE_KINDS, Severity::Error);
-    }
-    if let Some(topic) = rig.ground_truth_topic.as_ref().filter(|topic| !log.is_position_topic(topic)) {
-        require("ground_truth.rostopic".into(), topic, &POSES, Severity::Note);
-    }
-    if named > 0 {
-        findings.good(Area::Log, "the log has the topics of the rig", format!("{named} of them"));
-    }
-}
-
-/// Use of a topic by the rig.
-fn role_of(topic: &str, kind: Option<MessageKind>, rig: Option<&Rig>) -> String {
-    if rig.is_some_and(|rig| rig.ground_truth_topic.as_deref() == Some(topic)) {
-        return "ground truth".into();
-    }
-    let Some(kind) = kind else { return "ignored".into() };
-    if let Some(rig) = rig {
-        if topic == rig.imu.topic {
-            return "imu0".into();
-        }
-        if rig.imu.accelerometer_topic.as_deref() == Some(topic) {
-            return "imu0 accelerometer".into();
-        }
-        if rig.gimbal_imu.as_ref().is_some_and(|imu| imu.sensor.topic == topic) {
-            return "imu1".into();
-        }
-        if rig.gimbal_imu.as_ref().is_some_and(|imu| imu.sensor.accelerometer_topic.as_deref() == Some(topic)) {
-            return "imu1 accelerometer".into();
-        }
-        if let Some(camera) = rig.cameras.iter().find(|camera| camera.topic == topic) {
-            return camera.key.clone();
-        }
-        if rig.gimbal.as_ref().is_some_and(|gimbal| gimbal.topic.as_deref() == Some(topic)) {
-            return "gimbal".into();
-        }
-        if rig.vehicle_topic() == Some(topic) {
-            return "vehicle".into();
-        }
-    }
-    if kind == MessageKind::CameraInfo { "intrinsics".into() } else { "not in the rig".into() }
-}
-
-fn topic_reports(log: &FlightLog, survey: &Survey, rig: Option<&Rig>) -> Vec<TopicReport> {
-    let report = |info: &TopicInfo| {
-        let times = survey.topics.get(&info.topic).filter(|topic| !topic.times.is_empty());
-        // Stamps that were never set contain no time.
-        let times = times.filter(|topic| !topic.has_one_stamp());
-        let stamps = times.map(|topic| topic.stamp_range());
-        let (first_ns, last_ns) = stamps.unwrap_or((info.first_ns, info.last_ns));
-        TopicReport {
-            topic: info.topic.clone(),
-            schema: info.schema.clone(),
-            role: role_of(&info.topic, info.kind, rig),
-            count: info.count,
-            rate_hz: info.rate_hz,
-            first_s: seconds_from_ns(first_ns),
-            last_s: seconds_from_ns(last_ns),
-            latency_s: times.map(|topic| topic.median_latency_s()),
-        }
-    };
-    log.topics().iter().map(report).collect()
-}

@@ -1,6 +1,6 @@
 use nalgebra::Vector2;
 
-use super::{Area, CheckReport, Finding, Findings, Severity};
+use super::report::{Area, CheckReport, Finding, Findings, Severity};
 use crate::camera::{CameraModel, Projection};
 use crate::flight_log::FlightLog;
 use crate::sensors::{AssumedField, CameraRig, ChainPrior, GimbalRig, Rig};

@@ -8,7 +8,8 @@ use std::path::Path;
 use nalgebra::{UnitQuaternion, Vector3};
 use tempfile::TempDir;
 
-use super::{CheckReport, ImageRotation, Severity, check};
+use super::check;
+use super::report::{CheckReport, ImageRotation, Severity};
 use crate::camera::CameraModel;
 use crate::flight_log::{FlightLog, LogWriter, LogWriterOptions, MessageTimes};
 use crate::geometry::SplitMix64;

@@ -21,7 +21,7 @@ pub use self::refinement::ClockAlignment;
 use self::refinement::Refined;
 pub use self::series::RotationReference;
 use self::series::{DISTINCT_S, MIN_ROTATIONS, PairRotation};
-use super::ImageRotation;
+use super::report::ImageRotation;
 use super::statistics::median;
 use crate::geometry::{ns_from_seconds, seconds_from_ns, so3};
 

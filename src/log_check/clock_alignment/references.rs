@@ -8,7 +8,7 @@ use super::{AlignmentError, ClockAlignment, RotationReference, align_clocks};
 use crate::flight_log::FlightLog;
 use crate::geometry::seconds_from_ns;
 use crate::gimbal::ClassicalChain;
-use crate::log_check::ImageRotation;
+use crate::log_check::report::ImageRotation;
 use crate::log_check::survey::Survey;
 use crate::sensors::{AngularRates, CameraMount, JointSample, Rig};
 
@@ -66,11 +66,7 @@ pub fn align_camera(
 impl RotationReference {
     /// Orientations of a camera at the end of a chain, at the stamps of the joint angles; the gyroscope alone for a chain
     /// without joints.
-    pub(in crate::log_check) fn from_chain(
-        gyroscope: &AngularRates,
-        joint_samples: &[JointSample],
-        chain: &ClassicalChain,
-    ) -> Self {
+    pub(crate) fn from_chain(gyroscope: &AngularRates, joint_samples: &[JointSample], chain: &ClassicalChain) -> Self {
         if chain.links.is_empty() {
             return Self::Gyroscope(gyroscope.clone());
         }

@@ -12,7 +12,7 @@ const DRIFT_SIGMA: f64 = 1e-4;
 /// Prior standard deviation of the scale: a focal length from a field of view is known to some tenths.
 const SCALE_SIGMA: f64 = 0.3;
 /// Prior standard deviation of the gyroscope's bias: a consumer sensor has up to 5 °/s.
-pub(in crate::log_check) const BIAS_SIGMA_RAD_PER_S: f64 = 0.09;
+pub(crate) const BIAS_SIGMA_RAD_PER_S: f64 = 0.09;
 /// Prior standard deviation of the bias of orientations, which have none.
 const NO_BIAS_SIGMA_RAD_PER_S: f64 = 1e-6;
 const ITERATIONS: usize = 20;

@@ -4,10 +4,10 @@ use std::f64::consts::PI;
 
 use super::super::correction::{Correction, Parameter};
 use super::super::permutations::permutations;
-use super::super::rotation_data::RotationData;
 use super::fit::{Hypothesis, Kind};
 use super::joint_unit::JointUnit;
 use crate::gimbal::ClassicalChain;
+use crate::log_check::rotations::data::RotationData;
 use crate::sensors::CameraMount;
 
 /// Ratios from which a factor is fitted.

@@ -1,6 +1,7 @@
 //! Cause of a misfit as a finding.
 
-use super::super::{Area, MeasuredFault, Severity};
+use crate::log_check::measured_fault::MeasuredFault;
+use crate::log_check::report::{Area, Severity};
 
 /// Cause of a misfit in words.
 #[derive(Clone, Debug, PartialEq)]

@@ -2,10 +2,10 @@
 
 use nalgebra::Matrix3;
 
-use super::super::rotation_data::RotationData;
-use super::super::{FaultySource, MeasuredFault};
 use super::fit::{Fitted, Kind};
 use crate::geometry::SignedAxes;
+use crate::log_check::measured_fault::{FaultySource, MeasuredFault};
+use crate::log_check::rotations::data::RotationData;
 use crate::sensors::CameraMount;
 
 /// Fault that a fit describes; `None` if the fit does not give its value.

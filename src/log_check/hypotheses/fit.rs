@@ -6,10 +6,12 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 
 use super::super::correction::{Correction, LensChange, Parameter};
-use super::super::rotation_data::{JOINED_S, MeasuredRotation, RotationData, joined};
-use super::super::rotation_fit::{ExtraColumn, FREE_ORIENTATION_RAD, FitPriors, Prediction, RotationFit, RotationPair};
 use super::super::statistics::median;
 use crate::gimbal::ClassicalChain;
+use crate::log_check::rotations::data::{JOINED_S, MeasuredRotation, RotationData, joined};
+use crate::log_check::rotations::fit::{
+    ExtraColumn, FREE_ORIENTATION_RAD, FitPriors, Prediction, RotationFit, RotationPair,
+};
 
 /// Prior standard deviation of the time offset of camera and gyroscope beyond the rig's.
 const OFFSET_SIGMA_S: f64 = 0.02;

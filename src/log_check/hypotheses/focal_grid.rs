@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::super::ImageRotation;
 use super::super::correction::{Correction, LensChange};
-use super::super::rotation_data::{MeasuredRotation, joined};
-use super::super::rotation_fit::tail_cost;
 use super::fit::{Fitted, Fitter, Kind, Predictions, length_s};
 use crate::geometry::so3;
+use crate::log_check::report::ImageRotation;
+use crate::log_check::rotations::data::{MeasuredRotation, joined};
+use crate::log_check::rotations::fit::tail_cost;
 
 /// Range of the ratios of a focal length to the rig's, and the number of steps whose rotations are measured.
 const RATIOS: [f64; 2] = [0.4, 2.6];

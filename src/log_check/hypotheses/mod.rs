@@ -19,9 +19,9 @@ use self::candidates::{candidates, intrinsics};
 pub(super) use self::cause::NamedCause;
 use self::fit::{Fitted, Fitter, Hypothesis, Kind, length_s};
 use self::focal_grid::FocalGrid;
-use super::rotation_data::RotationData;
-use super::rotation_fit::RotationFit;
-use super::{Area, Findings, Severity};
+use super::report::{Area, Findings, Severity};
+use super::rotations::data::RotationData;
+use super::rotations::fit::RotationFit;
 use crate::gimbal::ClassicalChain;
 
 /// Difference of the criterion by which a hypothesis must be better than another to exclude it: odds of e⁻¹⁰.

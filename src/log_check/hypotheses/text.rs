@@ -1,12 +1,12 @@
 //! Findings of the hypotheses in words, with values, times and remedies.
 
 use super::super::correction::USELESS_DELAY_S;
-use super::super::rotation_data::RotationData;
-use super::super::{Area, Severity};
 use super::cause::NamedCause;
 use super::fault::recorded_axes;
 use super::fit::{Fitted, Kind};
 use super::joint_unit::JointUnit;
+use crate::log_check::report::{Area, Severity};
+use crate::log_check::rotations::data::RotationData;
 
 /// Relative errors of intrinsics and scales above which results are useless.
 const USELESS_RATIO: f64 = 0.05;

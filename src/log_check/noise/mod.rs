@@ -15,8 +15,8 @@ use self::allan::{AllanPhase, AllanVariance, NoiseKind, confidence, counts, degr
 use self::samples::ImuSeries;
 use self::stretches::{evenly_sampled, stationary_stretches};
 use self::terms::Fit;
-use super::spectrum::{Spectrum, VibrationLine};
-use super::stationary::Stamped;
+use super::imu::spectrum::{Spectrum, VibrationLine};
+use super::imu::stationary::Stamped;
 use crate::flight_log::FlightLog;
 use crate::geometry::{ns_from_seconds, seconds_from_ns};
 use crate::sensors::Rig;

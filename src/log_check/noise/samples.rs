@@ -7,7 +7,7 @@ use crate::flight_log::imu_filter::{Unmeasured, has_forces};
 use crate::flight_log::log::relative_ns;
 use crate::flight_log::stamp_clock::StampClock;
 use crate::flight_log::{FlightLog, messages, messages::MessageKind};
-use crate::log_check::stationary::Stamped;
+use crate::log_check::imu::stationary::Stamped;
 use crate::sensors::Rig;
 
 /// Samples that are measurements, ordered by stamp.

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use crate::geometry::seconds_from_ns;
-use crate::log_check::stationary::{SMOOTHING_NS, Stamped, StationaryTest, WINDOW_NS, Window};
+use crate::log_check::imu::stationary::{SMOOTHING_NS, Stamped, StationaryTest, WINDOW_NS, Window};
 use crate::log_check::statistics::median;
 
 /// Largest standard deviations of the smoothed angular rate (rad/s) and specific force (m/s²) in addition to noise; a

@@ -4,12 +4,12 @@ use std::path::Path;
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use super::super::gimbal_imu::check_gimbal_imu;
 use super::super::report::Findings;
 use super::super::survey::Survey;
 use super::{rate_at, rig_text};
 use crate::geometry::{ns_from_seconds, so3};
-use crate::log_check::{ImageRotation, Severity};
+use crate::log_check::gimbal::gimbal_imu::check_gimbal_imu;
+use crate::log_check::report::{ImageRotation, Severity};
 use crate::sensors::{ImuSample, Rig};
 
 const SAMPLE_S: f64 = 0.005;

@@ -1,0 +1,71 @@
+//! The checks in their order.
+
+use super::report::{Area, CheckReport, Findings, ImageRotation, Severity};
+use super::survey::Survey;
+use super::{extrinsics, gimbal, ground_truth, images, imu, rig_sanity, stamps, topics};
+use crate::flight_log::{FlightLog, LogError};
+use crate::geometry::seconds_from_ns;
+use crate::sensors::Rig;
+
+/// Checks an entire log against its rig.
+///
+/// An error of reading the rig becomes a finding, and the checks that need no rig are run.
+/// `image_rotations` are optional: with them the extrinsic rotations and the time offset of the cameras are checked
+/// against the gyroscope, and their readouts are measured.
+pub fn check(log: &FlightLog, rig: Result<&Rig, &LogError>, image_rotations: &[ImageRotation]) -> CheckReport {
+    let mut survey = Survey::of(log, rig.ok());
+    let mut findings = Findings::default();
+    topics::check_file(log, &survey, rig.ok(), &mut findings);
+    match rig {
+        Ok(rig) => {
+            topics::check_topics(log, rig, &mut findings);
+            rig_sanity::check_rig(log, rig, &mut findings);
+        }
+        Err(error) => findings.add(
+            Severity::Error,
+            Area::Log,
+            "no usable rig",
+            error.to_string(),
+            match error {
+                LogError::NoRig { .. } => {
+                    "put the rig beside the log as NAME.rig.yaml, name one with --rig, or write one with `dcvins rig new`"
+                }
+                _ => "correct the rig at the place that the error names",
+            },
+        ),
+    }
+    stamps::check_timing(&survey, rig.ok(), &mut findings);
+    imu::orientation_topics::check_orientation_topics(log, rig, &mut findings);
+    let imu_facts = imu::check_imu(&survey, rig.ok(), &mut findings);
+    imu::axes::check_imu_axes(&imu_facts, &mut findings);
+    let mut proposed_masks = Vec::new();
+    if let Ok(rig) = rig {
+        if let Some(fitted) = gimbal::source_fit::check_source(&survey, rig, &imu_facts, image_rotations, &mut findings)
+        {
+            // Joints and cameras are checked with the corrected attitude.
+            survey.use_source(rig, fitted.source, fitted.timeshift_s);
+        }
+        gimbal::check_joints(&survey, rig, &mut findings);
+        gimbal::check_joint_coverage(&survey, rig, &mut findings);
+        gimbal::vehicle_attitude::check_vehicle_attitude(&survey, rig, &imu_facts, &mut findings);
+        images::check_video_decoding(log, &survey, rig, &mut findings);
+        images::check_images(log, &survey, rig, &imu_facts, &mut findings);
+        stamps::copies::check_image_copies(&survey, rig, &imu_facts, &mut findings);
+        gimbal::frozen_joints::check_frozen_joints(&survey, rig, &imu_facts, &mut findings);
+        let rotations = extrinsics::check_rotations(&survey, rig, &imu_facts, image_rotations, &mut findings);
+        gimbal::gimbal_imu::check_gimbal_imu(&survey, rig, image_rotations, &mut findings);
+        ground_truth::check_ground_truth(log, rig, &imu_facts, &rotations, &mut findings);
+        proposed_masks = images::still_pixels::check_still_pixels(&survey, rig, image_rotations, &mut findings);
+    }
+    let mut findings = findings.list;
+    findings.sort_by_key(|finding| (std::cmp::Reverse(finding.severity), finding.area));
+    CheckReport {
+        log: log.path().display().to_string(),
+        rig: rig.ok().map(|rig| rig.name.clone()),
+        epoch_ns: log.epoch_ns(),
+        duration_s: seconds_from_ns(log.duration_ns()),
+        topics: topics::topic_reports(log, &survey, rig.ok()),
+        findings,
+        proposed_masks,
+    }
+}

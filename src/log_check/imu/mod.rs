@@ -1,0 +1,306 @@
+//! IMU: units, gravity, biases, noise, saturation, and the stationary intervals that show them.
+
+pub(super) mod axes;
+mod densities;
+pub(super) mod orientation_topics;
+pub(super) mod spectrum;
+pub(super) mod stationary;
+mod unmeasured;
+
+use nalgebra::Vector3;
+
+use self::densities::check_noise;
+use self::spectrum::Spectrum;
+use self::stationary::{Stamped, StationaryTest, WINDOW_NS, Window};
+use self::unmeasured::check_unmeasured;
+use super::measured_fault::{FaultySource, MeasuredFault};
+use super::report::{Area, Findings, Measurement, Severity};
+use super::statistics::{median, percentile};
+use super::survey::Survey;
+use crate::geometry::{mean, seconds_from_ns};
+use crate::sensors::{AngularRates, ImuSample, Rig};
+
+/// Norm of the specific force below which it counts as unset in the message.
+const NO_FORCE_M_PER_S2: f64 = 0.01;
+/// Ratio of the specific force to gravity below which it does not contain gravity.
+const NO_GRAVITY_RATIO: f64 = 0.3;
+/// Factors by which a wrong range setting changes measurements.
+const RANGE_FACTORS: [f64; 4] = [0.25, 0.5, 2.0, 4.0];
+/// Relative error of such a factor, and bias of an accelerometer, in m/s², within which the factor counts as found.
+const RANGE_TOLERANCE: f64 = 0.03;
+const LARGEST_BIAS_M_PER_S2: f64 = 0.3;
+/// Longest stretch of equal samples of a driver that sends faster than the sensor measures.
+const LONGEST_REPETITION: usize = 20;
+/// Standard deviations of the smoothed angular rate (rad/s) and specific force (m/s²) of a stationary or hovering
+/// vehicle, white noise removed.
+const STATIONARY_MOTION: [f64; 2] = [0.012, 0.06];
+
+/// IMU samples and quantities derived from them, for later checks.
+#[derive(Clone, Debug, Default)]
+pub(super) struct ImuFacts {
+    /// Samples that are measurements, ordered by stamp.
+    pub(super) samples: Vec<ImuSample>,
+    /// Angular rates of the samples without bias.
+    pub(super) gyroscope: AngularRates,
+    /// Mean angular rate while stationary, in the IMU frame; `None` if the vehicle is never stationary.
+    pub(super) gyroscope_bias_rad_per_s: Option<Vector3<f64>>,
+    /// Time and mean specific force (IMU frame, m/s²) of a stationary window; without one, the middle and the mean of
+    /// the log. The vector points up.
+    pub(super) up: Option<(i64, Vector3<f64>)>,
+}
+
+/// Checks units, gravity, biases, noise and saturation of the IMU, and finds stationary periods.
+pub(super) fn check_imu(survey: &Survey, rig: Option<&Rig>, findings: &mut Findings) -> ImuFacts {
+    check_unmeasured(survey, findings);
+    let samples = survey.imu.clone();
+    if samples.len() < 10 {
+        return ImuFacts { samples, ..ImuFacts::default() };
+    }
+    let rates: Vec<Stamped> =
+        samples.iter().map(|sample| (sample.stamp_ns, sample.angular_velocity_rad_per_s)).collect();
+    // Specific forces are those of a separate accelerometer topic, if there is one: interpolation removes noise.
+    let forces: Vec<Stamped> = if survey.accelerometer.is_empty() {
+        samples.iter().map(|sample| (sample.stamp_ns, sample.specific_force_m_per_s2)).collect()
+    } else {
+        survey.accelerometer.clone()
+    };
+    let spectra = [Spectrum::of(&rates), Spectrum::of(&forces)];
+    let windows = windows_of(&rates, &forces, &spectra);
+    let stationary: Vec<Window> = windows.iter().filter(|window| window.stationary).copied().collect();
+    let others: Vec<&String> =
+        survey.imu_topics.iter().filter(|topic| survey.imu_topic.as_ref() != Some(*topic)).collect();
+    check_gravity(&samples, &stationary, rig, &others, findings);
+    let gyroscope_bias = check_gyroscope_bias(&stationary, findings);
+    check_clipping(&samples, findings);
+    check_noise(&spectra, rig, findings);
+    check_stationary(&windows, findings);
+    let forces = || samples.iter().map(|sample| sample.specific_force_m_per_s2).collect::<Vec<_>>();
+    let middle_ns = |(start_ns, end_ns): (i64, i64)| start_ns.midpoint(end_ns);
+    let stationary_up =
+        stationary.get(stationary.len() / 2).map(|window| (middle_ns(window.range_ns), window.mean_force));
+    let up = stationary_up.unwrap_or_else(|| (samples[samples.len() / 2].stamp_ns, mean(&forces())));
+    let bias = gyroscope_bias.unwrap_or_default();
+    let unbiased = rates.iter().map(|(stamp_ns, rate)| (seconds_from_ns(*stamp_ns), rate - bias));
+    let gyroscope = AngularRates::new(unbiased).bridging_gaps();
+    ImuFacts { samples, gyroscope, gyroscope_bias_rad_per_s: gyroscope_bias, up: Some(up) }
+}
+
+/// Windows of a log from its angular rates and specific forces, both ordered by stamp.
+fn windows_of(rates: &[Stamped], forces: &[Stamped], spectra: &[Option<Spectrum>; 2]) -> Vec<Window> {
+    let densities = spectra.each_ref().map(|spectrum| spectrum.as_ref().map_or(0.0, |spectrum| spectrum.density));
+    let test = StationaryTest::new(STATIONARY_MOTION, densities, 1.0);
+    let mut windows = Vec::new();
+    let mut begin = 0;
+    while begin < rates.len() {
+        let start_ns = rates[begin].0;
+        let end = rates.partition_point(|(stamp_ns, _)| *stamp_ns < start_ns + WINDOW_NS);
+        if end - begin >= 20 && rates.len() > end {
+            windows.push(test.window(rates, forces, start_ns));
+        }
+        begin = end;
+    }
+    windows
+}
+
+fn check_gravity(
+    samples: &[ImuSample],
+    stationary: &[Window],
+    rig: Option<&Rig>,
+    other_topics: &[&String],
+    findings: &mut Findings,
+) {
+    let gravity = rig.map_or(9.81, |rig| rig.gravity_m_per_s2);
+    if !(9.75..=9.85).contains(&gravity) {
+        let evidence = format!("{gravity} m/s²; on the ground it lies between 9.78 and 9.83");
+        findings.add(
+            Severity::Warning,
+            Area::Imu,
+            "the rig's gravity is unusual",
+            evidence,
+            "set gravity for the place of the flight",
+        );
+    }
+    let (measured, when) = if stationary.is_empty() {
+        // If start and end velocity are equal, the mean specific force is gravity, measured in a tilting frame.
+        let norms: Vec<f64> = samples.iter().map(|sample| sample.specific_force_m_per_s2.norm()).collect();
+        (median(&norms), "median over the flight")
+    } else {
+        let norms: Vec<f64> = stationary.iter().map(|window| window.mean_force.norm()).collect();
+        (median(&norms), "while stationary")
+    };
+    let difference = measured - gravity;
+    let evidence = format!("|a| is {measured:.3} m/s² {when}, gravity {gravity:.3}: {difference:+.3} m/s²");
+    if measured < NO_FORCE_M_PER_S2 {
+        findings.exclude(Measurement::Accelerometer);
+        let quoted: Vec<String> = other_topics.iter().map(|topic| format!("'{topic}'")).collect();
+        let remedy = if quoted.is_empty() {
+            "record the accelerometer, too".to_owned()
+        } else {
+            format!("name the accelerometer's topic in imu0.accelerometer_rostopic: one of {}", quoted.join(", "))
+        };
+        return findings.add(
+            Severity::Error,
+            Area::Imu,
+            "the IMU's messages have no specific force",
+            evidence,
+            &remedy,
+        );
+    }
+    let is_steady = stationary.is_empty() && has_steady_norm(samples);
+    let near = |factor: &f64| {
+        let expected = factor * gravity;
+        (measured - expected).abs() < LARGEST_BIAS_M_PER_S2.max(RANGE_TOLERANCE * expected)
+    };
+    let range_factor = RANGE_FACTORS.into_iter().find(near);
+    let multiple = format!("the accelerometer measures {} times gravity", range_factor.unwrap_or(1.0));
+    let is_scaled = is_steady || !stationary.is_empty();
+    let (severity, title, remedy, fault) = if (measured - 1.0).abs() < 0.2 && is_scaled {
+        (
+            Severity::Error,
+            "accelerations are in g, not m/s²",
+            "multiply by 9.80665 in the driver: sensor_msgs/Imu requires m/s²",
+            Some(MeasuredFault::AccelerometerScale(9.806_65)),
+        )
+    } else if measured < NO_GRAVITY_RATIO * gravity {
+        (
+            Severity::Error,
+            "gravity is already removed from the accelerations",
+            "record the raw accelerometer (specific force): linear accelerations of a filter cannot be used",
+            Some(MeasuredFault::Irreversible(FaultySource::Imu)),
+        )
+    } else if let Some(factor) = range_factor.filter(|_| is_scaled) {
+        (
+            Severity::Error,
+            multiple.as_str(),
+            "the range setting of the sensor and the scale of its driver differ: correct one of them",
+            Some(MeasuredFault::AccelerometerScale(factor.recip())),
+        )
+    } else if difference.abs() > 2.0 {
+        (
+            Severity::Error,
+            "the accelerometer does not measure gravity",
+            "check units, scale and IMU intrinsics in the driver: while stationary the norm must be gravity",
+            None,
+        )
+    } else if difference.abs() > 0.2 && !stationary.is_empty() {
+        (
+            if difference.abs() > 1.0 { Severity::Warning } else { Severity::Note },
+            "the accelerometer has a large bias or scale error along gravity",
+            "the estimator finds the bias once the vehicle moves; expect a slow start, or calibrate the IMU",
+            None,
+        )
+    } else {
+        return findings.good(Area::Imu, "the accelerometer measures gravity", evidence);
+    };
+    findings.add(severity, Area::Imu, title, evidence, remedy);
+    findings.state_faults(fault);
+    if severity == Severity::Error {
+        findings.exclude(Measurement::Accelerometer);
+    }
+}
+
+/// True if the norm of the specific force varies little around its median: it contains gravity, in whatever unit.
+fn has_steady_norm(samples: &[ImuSample]) -> bool {
+    let norms: Vec<f64> = samples.iter().map(|sample| sample.specific_force_m_per_s2.norm()).collect();
+    percentile(&norms, 0.9) - percentile(&norms, 0.1) < 0.5 * median(&norms)
+}
+
+fn check_gyroscope_bias(stationary: &[Window], findings: &mut Findings) -> Option<Vector3<f64>> {
+    if stationary.is_empty() {
+        return None;
+    }
+    let rates: Vec<Vector3<f64>> = stationary.iter().map(|window| window.mean_rate).collect();
+    // The median of each axis is insensitive to slow rotation in some of the windows.
+    let axis = |index: usize| median(&rates.iter().map(|rate| rate[index]).collect::<Vec<_>>());
+    let bias = Vector3::new(axis(0), axis(1), axis(2));
+    let evidence = format!("({:+.4}, {:+.4}, {:+.4}) rad/s while stationary or hovering", bias.x, bias.y, bias.z);
+    if bias.norm() > 0.03 {
+        let remedy = "calibrate the gyroscope before the flight, unless the vehicle rotated slowly all the time";
+        findings.add(Severity::Note, Area::Imu, "the gyroscope's bias is large", evidence, remedy);
+    } else {
+        findings.good(Area::Imu, "the gyroscope's bias is small", evidence);
+    }
+    Some(bias)
+}
+
+/// Checks saturation (many samples at exactly the largest value) and repeated samples.
+fn check_clipping(samples: &[ImuSample], findings: &mut Findings) {
+    let components = |gyroscope: bool, axis: usize| {
+        samples.iter().map(move |sample| {
+            if gyroscope { sample.angular_velocity_rad_per_s[axis] } else { sample.specific_force_m_per_s2[axis] }
+        })
+    };
+    let mut largest = [0.0_f64; 2];
+    let mut clipped = false;
+    for (name, gyroscope) in [("gyroscope", true), ("accelerometer", false)] {
+        for axis in 0..3 {
+            let limit = components(gyroscope, axis).map(f64::abs).fold(0.0, f64::max);
+            let hits = components(gyroscope, axis).filter(|value| value.abs() >= limit).count();
+            largest[usize::from(!gyroscope)] = largest[usize::from(!gyroscope)].max(limit);
+            if hits >= 3 && hits < samples.len() / 2 && limit > if gyroscope { 1.0 } else { 12.0 } {
+                clipped = true;
+                let unit = if gyroscope { "rad/s" } else { "m/s²" };
+                let title = format!("the {name} saturates on {}", ["x", "y", "z"][axis]);
+                let evidence = format!("{hits} samples at exactly ±{limit:.4} {unit}");
+                let remedy =
+                    "set a wider range in the sensor, or reduce vibration: clipped samples bias the preintegration";
+                findings.add(Severity::Warning, Area::Imu, title, evidence, remedy);
+            }
+        }
+    }
+    let evidence = format!("largest values {:.2} rad/s and {:.1} m/s²", largest[0], largest[1]);
+    if largest[0] > 35.0 {
+        let remedy = "check the unit: sensor_msgs/Imu requires rad/s, and 35 rad/s is 2000 °/s";
+        findings.add(Severity::Error, Area::Imu, "angular velocities appear to be in degrees", evidence, remedy);
+        findings.state_faults([MeasuredFault::GyroscopeScale(std::f64::consts::PI / 180.0)]);
+        findings.exclude(Measurement::Gyroscope);
+    } else if !clipped {
+        findings.good(Area::Imu, "the IMU does not saturate", evidence);
+    }
+    let equal = |one: &ImuSample, other: &ImuSample| {
+        one.angular_velocity_rad_per_s == other.angular_velocity_rad_per_s
+            && one.specific_force_m_per_s2 == other.specific_force_m_per_s2
+    };
+    // A simulated sensor without noise repeats its values for as long as nothing moves.
+    let stretches = samples.chunk_by(equal).filter(|equal| equal.len() <= LONGEST_REPETITION);
+    let repeated: usize = stretches.map(|equal| equal.len() - 1).sum();
+    if repeated * 100 > samples.len() {
+        let evidence = format!("{repeated} of {} samples equal the previous one in all six values", samples.len());
+        let remedy = "the driver sends faster than the sensor measures, or fills gaps: send each measurement once";
+        findings.add(Severity::Warning, Area::Imu, "IMU samples repeat", evidence, remedy);
+    }
+}
+
+/// Finds periods in which the vehicle is stationary or hovers: such motion neither initializes nor calibrates.
+fn check_stationary(windows: &[Window], findings: &mut Findings) {
+    let total_s = windows.len() as f64 * seconds_from_ns(WINDOW_NS);
+    let mut periods: Vec<(i64, i64)> = Vec::new();
+    for (start_ns, end_ns) in windows.iter().filter(|window| window.stationary).map(|window| window.range_ns) {
+        match periods.last_mut().filter(|last| start_ns - last.1 < WINDOW_NS / 2) {
+            Some(last) => last.1 = end_ns,
+            None => periods.push((start_ns, end_ns)),
+        }
+    }
+    periods.retain(|(begin, end)| end - begin >= 2 * WINDOW_NS);
+    let stationary_s: f64 = periods.iter().map(|(begin, end)| seconds_from_ns(end - begin)).sum();
+    if periods.is_empty() {
+        let title = "the vehicle is never stationary";
+        let remedy = "initialization needs motion; biases cannot be measured directly";
+        return findings.add(
+            Severity::Note,
+            Area::Motion,
+            title,
+            format!("no stationary interval of 1 s in {total_s:.0} s"),
+            remedy,
+        );
+    }
+    let listed: Vec<String> = periods
+        .iter()
+        .take(6)
+        .map(|(begin, end)| format!("{:.1}–{:.1} s", seconds_from_ns(*begin), seconds_from_ns(*end)))
+        .collect();
+    let evidence = format!("{stationary_s:.1} of {total_s:.1} s: {}", listed.join(", "));
+    let remedy = "scale and calibration are unobservable there; initialization needs motion";
+    let severity = if stationary_s > 0.5 * total_s { Severity::Warning } else { Severity::Note };
+    findings.add(severity, Area::Motion, "the vehicle is stationary or hovers", evidence, remedy);
+}

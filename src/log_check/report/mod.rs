@@ -1,0 +1,205 @@
+//! Findings of a check and the report that holds them.
+
+mod render;
+pub(super) mod verdict;
+
+use std::collections::BTreeSet;
+
+use nalgebra::UnitQuaternion;
+use serde::ser::SerializeStruct as _;
+use serde::{Serialize, Serializer};
+
+use super::measured_fault::MeasuredFault;
+use crate::flight_log::without_signed_zeros;
+use crate::frontend::readout::RowTrack;
+use crate::sensors::ImageMask;
+
+/// Severity of a finding.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Severity {
+    Good,
+    Note,
+    /// Degrades results or delays initialization.
+    Warning,
+    /// Makes results invalid until it is corrected.
+    Error,
+}
+
+/// Subject of a finding.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Area {
+    /// The file and its topics.
+    Log,
+    /// Time bases, rates, gaps and order of stamps.
+    Time,
+    /// Units, gravity, biases, noise and saturation of the IMU.
+    #[serde(rename = "inertial")]
+    Imu,
+    /// Stationary and hovering periods, fast rotation.
+    Motion,
+    /// Joint angles and their limits.
+    Encoders,
+    /// Size, blur, exposure and texture.
+    Images,
+    /// Camera models and lenses.
+    Intrinsics,
+    /// Poses of the cameras relative to the IMU.
+    Extrinsics,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Finding {
+    pub severity: Severity,
+    pub area: Area,
+    /// In one sentence.
+    pub title: String,
+    /// Measured values with units.
+    pub evidence: String,
+    /// Instruction; empty if nothing needs to be done.
+    pub remedy: String,
+    /// True for a value of the rig that is only assumed, without a sign that it is wrong.
+    #[serde(skip)]
+    pub is_assumption: bool,
+    /// Faults with their values, of which one changes the estimates of a run; empty if none is known.
+    #[serde(skip)]
+    pub faults: Vec<MeasuredFault>,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TopicReport {
+    pub topic: String,
+    /// Message type, such as `sensor_msgs/msg/Imu`.
+    pub schema: String,
+    /// `imu0`, `cam0`, `gimbal`, `ground truth`, `not in the rig`, or `ignored`.
+    pub role: String,
+    pub count: u64,
+    /// Mean rate over its log times, in Hz.
+    pub rate_hz: f64,
+    /// First header stamp since the log began, in seconds; log time for an ignored topic.
+    pub first_s: f64,
+    /// Last header stamp, as for `first_s`.
+    pub last_s: f64,
+    /// Median of log time minus header stamp in seconds, `None` for an ignored topic.
+    pub latency_s: Option<f64>,
+}
+
+/// Rotation between two images of one camera, measured from the images alone.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ImageRotation {
+    pub camera_key: String,
+    /// Header stamp of the first image since the log began.
+    pub from_ns: i64,
+    /// Header stamp of the second image.
+    pub to_ns: i64,
+    /// Rotates vectors from the camera frame of the first image to that of the second.
+    pub second_from_first: UnitQuaternion<f64>,
+    /// Features of both images, for the readout; may be empty.
+    pub tracks: Vec<RowTrack>,
+}
+
+/// Result of [`check`](super::check); as JSON it begins with the verdict.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CheckReport {
+    pub log: String,
+    /// Name of the rig, `None` without a readable one.
+    pub rig: Option<String>,
+    /// Absolute header stamp of the log's start, in nanoseconds.
+    pub epoch_ns: i64,
+    /// Length of the log, in seconds.
+    pub duration_s: f64,
+    /// All topics, ordered by name.
+    pub topics: Vec<TopicReport>,
+    /// Most severe first, then by area.
+    pub findings: Vec<Finding>,
+    /// Masks for cameras with the vehicle in view.
+    pub proposed_masks: Vec<ProposedMask>,
+}
+
+/// Mask of the static pixels in the images of a camera.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ProposedMask {
+    pub camera_key: String,
+    /// The proposed pixels, without those of the rig's mask.
+    pub mask: ImageMask,
+}
+
+impl Serialize for CheckReport {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut fields = serializer.serialize_struct("CheckReport", 7)?;
+        fields.serialize_field("verdict", &self.verdict())?;
+        fields.serialize_field("log", &self.log)?;
+        fields.serialize_field("rig", &self.rig)?;
+        fields.serialize_field("epoch_ns", &self.epoch_ns)?;
+        fields.serialize_field("duration_s", &self.duration_s)?;
+        fields.serialize_field("topics", &self.topics)?;
+        fields.serialize_field("findings", &self.findings)?;
+        fields.end()
+    }
+}
+
+impl CheckReport {
+    /// Highest severity of the findings.
+    pub fn worst(&self) -> Severity {
+        self.findings.iter().map(|finding| finding.severity).max().unwrap_or(Severity::Good)
+    }
+}
+
+/// Measurements that comparisons use.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Measurement {
+    Gyroscope,
+    Accelerometer,
+    /// Angles of the joints.
+    Joints,
+}
+
+/// Findings in the order of the checks.
+#[derive(Debug, Default)]
+pub(super) struct Findings {
+    pub(super) list: Vec<Finding>,
+    /// Measurements with a fault that is reported: comparisons with them would report its consequences as causes.
+    faulty: BTreeSet<Measurement>,
+}
+
+impl Findings {
+    pub(super) fn add(
+        &mut self,
+        severity: Severity,
+        area: Area,
+        title: impl Into<String>,
+        evidence: impl Into<String>,
+        remedy: impl Into<String>,
+    ) {
+        let [title, evidence, remedy] = [title.into(), evidence.into(), remedy.into()].map(without_signed_zeros);
+        self.list.push(Finding { severity, area, title, evidence, remedy, is_assumption: false, faults: Vec::new() });
+    }
+
+    /// States the fault of the finding that was added last with its value, or the faults one of which it is.
+    pub(super) fn state_faults(&mut self, faults: impl IntoIterator<Item = MeasuredFault>) {
+        if let Some(last) = self.list.last_mut() {
+            last.faults.extend(faults);
+        }
+    }
+
+    /// Adds a warning about a value that is only assumed.
+    pub(super) fn assumption(&mut self, area: Area, title: String, evidence: String, remedy: String) {
+        let severity = Severity::Warning;
+        self.list.push(Finding { severity, area, title, evidence, remedy, is_assumption: true, faults: Vec::new() });
+    }
+
+    /// Excludes a measurement, whose fault is reported, from later comparisons.
+    pub(super) fn exclude(&mut self, measurement: Measurement) {
+        self.faulty.insert(measurement);
+    }
+
+    /// True unless a fault of the measurement is reported.
+    pub(super) fn can_compare(&self, measurement: Measurement) -> bool {
+        !self.faulty.contains(&measurement)
+    }
+
+    pub(super) fn good(&mut self, area: Area, title: impl Into<String>, evidence: impl Into<String>) {
+        self.add(Severity::Good, area, title, evidence, "");
+    }
+}

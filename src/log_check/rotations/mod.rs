@@ -1,0 +1,5 @@
+//! Rotations of cameras against those of the IMU: the measured ones, the fit of a chain to them, and the readout of rows.
+
+pub(super) mod data;
+pub(super) mod fit;
+pub(super) mod readout;
