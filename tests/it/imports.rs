@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
+use std::sync::LazyLock;
 
 /// Path of a module below the crate's root, outermost name first.
 type ModulePath = Vec<String>;
@@ -34,10 +35,27 @@ enum Target {
     Item(usize, String),
 }
 
+/// Names that one file takes from another.
+struct Edge<'a> {
+    from: &'a str,
+    to: &'a str,
+    names: &'a BTreeSet<String>,
+}
+
+impl<'a> Edge<'a> {
+    /// Children of a folder to which both files belong, if they differ.
+    fn between_children(&self, folder: &str) -> Option<(&'a str, &'a str)> {
+        let pair = (child_of(self.from, folder)?, child_of(self.to, folder)?);
+        (pair.0 != pair.1).then_some(pair)
+    }
+}
+
 /// Source files with the names that each takes from others.
 pub(crate) struct Imports {
     files: Vec<SourceFile>,
     modules: BTreeMap<ModulePath, usize>,
+    /// Imports between files, by their positions and ordered by their names.
+    taken: Vec<(usize, usize, BTreeSet<String>)>,
 }
 
 /// Name below `src`, with `/`, and text of every Rust file, in the order of their paths.
@@ -62,10 +80,13 @@ pub(crate) fn source_files() -> Vec<(String, String)> {
 }
 
 impl Imports {
-    /// Reads all files below `src` but `main.rs` and the files of tests.
-    pub(crate) fn read() -> Self {
-        let library = source_files().into_iter().filter(|(name, _)| name != "main.rs" && !is_test_file(name));
-        Self::of(library.collect())
+    /// All files below `src` but `main.rs` and the files of tests, read once.
+    pub(crate) fn read() -> &'static Self {
+        static IMPORTS: LazyLock<Imports> = LazyLock::new(|| {
+            let library = source_files().into_iter().filter(|(name, _)| name != "main.rs" && !is_test_file(name));
+            Imports::of(library.collect())
+        });
+        &IMPORTS
     }
 
     /// Reads files given as name below `src` and text.
@@ -73,24 +94,87 @@ impl Imports {
         texts.sort();
         let files: Vec<SourceFile> = texts.into_iter().map(|(name, text)| SourceFile::parse(name, &text)).collect();
         let modules = files.iter().enumerate().map(|(index, file)| (file.module.clone(), index)).collect();
-        Self { files, modules }
+        let mut imports = Self { files, modules, taken: Vec::new() };
+        let of_file = |from: usize| imports.taken_by(from).into_iter().map(move |(to, names)| (from, to, names));
+        imports.taken = (0..imports.files.len()).flat_map(of_file).collect();
+        imports
+    }
+
+    fn edges(&self) -> Vec<Edge<'_>> {
+        let name = |index: &usize| self.files[*index].name.as_str();
+        self.taken.iter().map(|(from, to, names)| Edge { from: name(from), to: name(to), names }).collect()
     }
 
     /// Circles of files that import each other: per circle one line `from -> to: names` per import inside it.
     pub(crate) fn circles(&self) -> Vec<Vec<String>> {
-        let edges: Vec<BTreeMap<usize, BTreeSet<String>>> =
-            (0..self.files.len()).map(|index| self.taken_by(index)).collect();
-        let reached: Vec<BTreeSet<usize>> = (0..edges.len()).map(|index| reachable(&edges, index)).collect();
-        let mut circles: BTreeMap<usize, Vec<String>> = BTreeMap::new();
-        for (from, taken) in edges.iter().enumerate() {
-            for (to, names) in taken.iter().filter(|(to, _)| reached[**to].contains(&from)) {
-                let (from_name, to_name) = (&self.files[from].name, &self.files[*to].name);
-                let first = *reached[from].iter().find(|other| reached[**other].contains(&from)).unwrap_or(&from);
-                let names: Vec<&str> = names.iter().map(String::as_str).collect();
-                circles.entry(first).or_default().push(format!("{from_name} -> {to_name}: {}", names.join(", ")));
+        let edges = self.edges();
+        let groups = circles_of(edges.iter().map(|edge| (edge.from, edge.to)));
+        let inside =
+            |group: &BTreeSet<&str>| lines(&edges, |edge| group.contains(edge.from) && group.contains(edge.to));
+        groups.iter().map(inside).collect()
+    }
+
+    /// Circles between the files and subfolders of one folder, whose imports count for the whole subfolder: by
+    /// `folder: child child …` the imports inside the circle.
+    pub(crate) fn sibling_circles(&self) -> BTreeMap<String, Vec<String>> {
+        let edges = self.edges();
+        let mut circles = BTreeMap::new();
+        for folder in self.folders() {
+            let pairs = edges.iter().filter_map(|edge| edge.between_children(folder));
+            for group in circles_of(pairs) {
+                let is_inside = |(from, to): (&str, &str)| group.contains(from) && group.contains(to);
+                let key = format!("{folder}: {}", group.iter().copied().collect::<Vec<_>>().join(" "));
+                circles.insert(key, lines(&edges, |edge| edge.between_children(folder).is_some_and(is_inside)));
             }
         }
-        circles.into_values().collect()
+        circles
+    }
+
+    /// Imports of files in subfolders from a loose file of a folder around them that is not on the folder's ground
+    /// floor, by this loose file. A loose file is on the ground floor if it uses no subfolder of its folder, neither
+    /// itself nor through other loose files.
+    pub(crate) fn arrows_up(&self) -> BTreeMap<&str, Vec<String>> {
+        let edges = self.edges();
+        let mut arrows = BTreeMap::new();
+        for folder in self.folders() {
+            let is_loose = |name: &str| child_of(name, folder).is_some_and(is_file);
+            let is_deeper = |name: &str| child_of(name, folder).is_some_and(|child| !is_file(child));
+            let mut upper: BTreeSet<&str> = BTreeSet::new();
+            loop {
+                let before = upper.len();
+                let uses = |edge: &&Edge<'_>| is_loose(edge.from) && (is_deeper(edge.to) || upper.contains(edge.to));
+                upper = edges.iter().filter(uses).map(|edge| edge.from).collect();
+                if upper.len() == before {
+                    break;
+                }
+            }
+            for file in upper {
+                let imports = lines(&edges, |edge| edge.to == file && is_deeper(edge.from));
+                if !imports.is_empty() {
+                    arrows.insert(file, imports);
+                }
+            }
+        }
+        arrows
+    }
+
+    /// Imports from a file or folder to those that it must not import, except those inside the first; names are below
+    /// `src`, without `.rs`.
+    pub(crate) fn against(&self, rules: &[(&str, &[&str])]) -> Vec<String> {
+        let is_in = |name: &str, place: &&str| {
+            let rest = name.strip_prefix(*place);
+            rest.is_some_and(|rest| rest.starts_with('/') || rest == ".rs")
+        };
+        let breaks = |edge: &Edge<'_>, (from, others): &(&str, &[&str])| {
+            is_in(edge.from, from) && !is_in(edge.to, from) && others.iter().any(|other| is_in(edge.to, other))
+        };
+        lines(&self.edges(), |edge| rules.iter().any(|rule| breaks(edge, rule)))
+    }
+
+    /// Folders below `src`, subfolders included.
+    fn folders(&self) -> BTreeSet<&str> {
+        let of_file = |file: &'_ SourceFile| file.name.match_indices('/').map(|(at, _)| at).collect::<Vec<_>>();
+        self.files.iter().flat_map(|file| of_file(file).into_iter().map(|at| &file.name[..at])).collect()
     }
 
     /// Files that a file takes names from, with these names.
@@ -172,14 +256,46 @@ impl Imports {
     }
 }
 
-/// Files that can be reached from one by one import or more.
-fn reachable(edges: &[BTreeMap<usize, BTreeSet<String>>], from: usize) -> BTreeSet<usize> {
+/// Groups of nodes that reach each other along the pairs `(from, to)`.
+fn circles_of<'a>(pairs: impl Iterator<Item = (&'a str, &'a str)>) -> Vec<BTreeSet<&'a str>> {
+    let mut next: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
+    pairs.for_each(|(from, to)| {
+        next.entry(from).or_default().insert(to);
+    });
+    let reached: BTreeMap<&str, BTreeSet<&str>> = next.keys().map(|from| (*from, reachable(&next, from))).collect();
+    let reaches = |from: &str, to: &str| reached.get(from).is_some_and(|nodes| nodes.contains(to));
+    let group = |node: &&'a str| reached[*node].iter().copied().filter(|other| reaches(other, node)).collect();
+    let groups: BTreeSet<BTreeSet<&str>> = next.keys().map(group).collect();
+    groups.into_iter().filter(|group| !group.is_empty()).collect()
+}
+
+/// Nodes that can be reached from one by one step or more.
+fn reachable<'a>(next: &BTreeMap<&'a str, BTreeSet<&'a str>>, from: &'a str) -> BTreeSet<&'a str> {
     let mut reached = BTreeSet::new();
     let mut open = vec![from];
-    while let Some(index) = open.pop() {
-        open.extend(edges[index].keys().filter(|next| reached.insert(**next)));
+    while let Some(node) = open.pop() {
+        open.extend(next.get(node).into_iter().flatten().filter(|other| reached.insert(**other)));
     }
     reached
+}
+
+/// First name of a path below a folder: a file or a subfolder.
+fn child_of<'a>(name: &'a str, folder: &str) -> Option<&'a str> {
+    name.strip_prefix(folder)?.strip_prefix('/')?.split('/').next()
+}
+
+/// True for a child of a folder that is a file: only files have an ending.
+fn is_file(child: &str) -> bool {
+    child.contains('.')
+}
+
+/// Lines `from -> to: names` of the chosen imports.
+fn lines(edges: &[Edge<'_>], is_chosen: impl Fn(&Edge<'_>) -> bool) -> Vec<String> {
+    let line = |edge: &Edge<'_>| {
+        let names: Vec<&str> = edge.names.iter().map(String::as_str).collect();
+        format!("{} -> {}: {}", edge.from, edge.to, names.join(", "))
+    };
+    edges.iter().filter(|edge| is_chosen(edge)).map(line).collect()
 }
 
 /// Whether a file below `src` holds tests only, by its name or that of its folder.

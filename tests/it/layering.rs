@@ -44,6 +44,84 @@ const FILE_SYSTEM: [&str; 7] = ["flight_log", "export", "interop", "report", "sw
 /// The only folders that may name the crates of the window; `export` draws its panels.
 const WINDOW: [&str; 3] = ["gui", "export", "cli"];
 
+/// Circles between the files and subfolders of one folder that are still there, as `folder: child child …`.
+const KNOWN_CIRCLES: &[&str] = &[
+    "estimator: config state",
+    "flight_log: log.rs messages.rs topic_info.rs video",
+    "gui/window: context_menu copying.rs dialogs state.rs tour",
+    "gui: convergence flight.rs help panel.rs plot",
+    "gui: rendering scene",
+    "observability/laboratory: experiment.rs sensors",
+];
+
+/// Loose files that use a subfolder of their folder although files in subfolders use them.
+const KNOWN_ARROWS_UP: &[&str] = &[
+    "flight_log/grey_sampling.rs",
+    "flight_log/image_decoding.rs",
+    "flight_log/imu_filter.rs",
+    "flight_log/log.rs",
+    "flight_log/messages.rs",
+    "flight_log/stamp_clock.rs",
+    "flight_log/topic_info.rs",
+    "gui/determination.rs",
+    "gui/events.rs",
+    "gui/flight.rs",
+    "gui/pan_zoom.rs",
+    "gui/panel.rs",
+    "gui/path_field.rs",
+    "gui/window/copying.rs",
+    "gui/window/state.rs",
+    "observability/laboratory/advice.rs",
+    "observability/laboratory/experiment.rs",
+    "observability/laboratory/predicted_window.rs",
+    "observability/laboratory/situation.rs",
+    "study/summary_table.rs",
+];
+
+/// Folders or files with others that they must not import, as docs/architecture.md states under "Invariants".
+const MUST_NOT_IMPORT: &[(&str, &[&str])] = &[
+    // Values, column order and first estimates; no other folder of the estimator.
+    ("estimator/state", &["estimator"]),
+    // A factor depends on states and measurements, not on the window.
+    ("estimator/factors", &["estimator/window", "estimator/problem", "estimator/start", "estimator/report"]),
+    // Creates no events and does not decide which frames and features are in the window.
+    ("estimator/problem", &["estimator/report", "estimator/window", "estimator/start", "estimator/initialization"]),
+    // Depends neither on the window nor on the configuration.
+    ("estimator/initialization", &["estimator/window", "estimator/config", "estimator/start", "estimator/problem"]),
+    ("estimator/window", &["estimator/estimator", "estimator/start", "estimator/explain"]),
+    // A report never refers to the estimator or the window.
+    ("estimator/report", &["estimator/estimator", "estimator/window", "estimator/start", "estimator/explain"]),
+    // Blocks of the Jacobian come from the report alone.
+    ("estimator/explain", &["estimator/estimator", "estimator/window", "estimator/start", "estimator/config"]),
+    // The analysis gets a linearization, a chain and joint angles, not the estimator.
+    ("observability/analysis", &["estimator/estimator", "estimator/window", "estimator/report", "estimator/factors"]),
+    ("observability", &["estimator/estimator", "estimator/start"]),
+    // Runs no estimator.
+    ("log_check", &["estimator", "observability", "calibration", "simulation"]),
+    ("session/plan", &["session/record", "session/engine", "session/diagnosis", "session/playback"]),
+    // No thread and no estimator.
+    ("session/record", &["session/engine", "session/diagnosis", "session/playback", "estimator/estimator"]),
+    ("session/engine", &["session/diagnosis", "session/playback"]),
+    ("session/diagnosis", &["session/playback"]),
+    ("session/breakpoints", &["session/engine", "session/diagnosis", "session/playback"]),
+    // A panel reads the record and runs no estimator; files go through a trait.
+    ("gui", &["estimator/packed", "session/engine/threads", "session/engine/run_engine"]),
+    ("interop", &["session", "estimator"]),
+    // Figures are handed in.
+    ("report", &["gui", "estimator"]),
+    ("desktop", &["session", "estimator"]),
+];
+
+/// Imports that break an invariant and are still there, as `from -> to`.
+const KNOWN_BREACHES: &[&str] = &["estimator/state/calibration.rs -> estimator/config/options.rs"];
+
+/// Folders whose files must not name these words outside comments and tests.
+const MUST_NOT_NAME: &[(&str, &[&str])] = &[
+    ("session/record/", &["std::thread", "thread::spawn", "Mutex", "channel("]),
+    ("estimator/", &["std::thread", "Instant::now", "SystemTime"]),
+    ("simulation/", &["Instant::now", "SystemTime"]),
+];
+
 /// One source file: the folder it belongs to and its text without comments.
 struct Source {
     /// Path below `src`.
@@ -118,6 +196,21 @@ fn first_names_of_group(group: &str) -> Vec<String> {
 
 fn position(folder: &str) -> Option<usize> {
     ORDER.iter().position(|name| *name == folder)
+}
+
+/// Fails on findings that are not among the known ones, and on known ones that are gone.
+fn fail_on_difference<'a>(found: impl Iterator<Item = (&'a str, &'a [String])>, known: &[&str]) {
+    let mut gone: Vec<&str> = known.to_vec();
+    let mut violations = Vec::new();
+    for (key, imports) in found {
+        if known.contains(&key) {
+            gone.retain(|known| *known != key);
+        } else {
+            violations.push(format!("{key}\n    {}", imports.join("\n    ")));
+        }
+    }
+    violations.extend(gone.iter().map(|known| format!("{known}: gone, remove it from the list")));
+    fail_on(&violations);
 }
 
 fn fail_on(violations: &[String]) {
@@ -200,4 +293,59 @@ fn no_files_import_each_other_in_a_circle() {
     let circles = Imports::read().circles();
     let lines: Vec<String> = circles.iter().map(|circle| circle.join("\n")).collect();
     assert!(lines.is_empty(), "{} circles:\n{}", lines.len(), lines.join("\n\n"));
+}
+
+#[test]
+fn siblings_and_arrows_up_are_found() {
+    let file = |name: &str, text: &str| (name.to_owned(), text.to_owned());
+    let imports = Imports::of(vec![
+        file("lib.rs", "mod a;"),
+        file("a/mod.rs", "mod b;\nmod c;\nmod ground;\nmod roof;"),
+        file("a/b/mod.rs", "mod d;\nuse super::c::C;\npub struct B(C);"),
+        file("a/b/d.rs", "use crate::a::{ground::Ground, roof::Roof};\npub struct D(Ground, Roof);"),
+        file("a/c.rs", "use super::b::d::D;\npub struct C;\nfn f(_: D) {}"),
+        file("a/ground.rs", "pub struct Ground;"),
+        file("a/roof.rs", "use super::c::C;\npub struct Roof(C);"),
+    ]);
+    let circles = imports.sibling_circles();
+    let expected = ["a/b/mod.rs -> a/c.rs: C", "a/b/d.rs -> a/roof.rs: Roof", "a/c.rs -> a/b/d.rs: D"];
+    assert_eq!(circles.keys().collect::<Vec<_>>(), ["a: b c.rs roof.rs"]);
+    assert!(expected.iter().all(|line| circles["a: b c.rs roof.rs"].iter().any(|found| found == line)), "{circles:?}");
+    let arrows = imports.arrows_up();
+    assert_eq!(arrows["a/roof.rs"], ["a/b/d.rs -> a/roof.rs: Roof"]);
+    assert!(!arrows.contains_key("a/ground.rs"), "{arrows:?}");
+    assert_eq!(imports.against(&[("a/b", &["a/c", "b"])]), ["a/b/mod.rs -> a/c.rs: C"]);
+    assert_eq!(imports.against(&[("a/b", &["a"])]).len(), 3);
+}
+
+/// Each file and each subfolder of a folder is one node, to which all imports of its files belong.
+#[test]
+fn the_files_and_subfolders_of_a_folder_have_an_order() {
+    let imports = Imports::read();
+    let circles = imports.sibling_circles();
+    fail_on_difference(circles.iter().map(|(key, lines)| (key.as_str(), lines.as_slice())), KNOWN_CIRCLES);
+}
+
+/// A file in a subfolder may use a loose file of the folders around it only if this is on the ground floor there: it
+/// uses no subfolder, neither itself nor through other loose files. So a reader knows of each loose file whether the
+/// subfolders are built on it or it on them.
+#[test]
+fn subfolders_use_only_the_ground_floor_of_the_folders_around_them() {
+    let imports = Imports::read();
+    let arrows = imports.arrows_up();
+    fail_on_difference(arrows.iter().map(|(key, lines)| (*key, lines.as_slice())), KNOWN_ARROWS_UP);
+}
+
+#[test]
+fn folders_keep_their_invariants() {
+    let breaches = Imports::read().against(MUST_NOT_IMPORT);
+    let found = breaches.iter().map(|line| (line.split(':').next().unwrap_or(line), std::slice::from_ref(line)));
+    fail_on_difference(found, KNOWN_BREACHES);
+    let mut named = Vec::new();
+    for source in sources().iter().filter(|source| !source.test) {
+        let rules = MUST_NOT_NAME.iter().filter(|(folder, _)| source.name.starts_with(folder));
+        let words = rules.flat_map(|(_, words)| words.iter()).filter(|word| source.text.contains(**word));
+        named.extend(words.map(|word| format!("{}: names {word}", source.name)));
+    }
+    fail_on(&named);
 }
