@@ -11,12 +11,12 @@ use super::chain_prior::ChainTerm;
 use super::frame_sets::{FrameSet, ImuBuffer, frame_sets};
 use super::outcome::{
     CalibratedParameter, CalibrationOutcome, ExtrinsicsReport, ImuResidualReport, PixelReport, PoseLoopReport,
+    Statistics,
 };
 use super::pose_loop::{PoseLoopSolution, PoseLoops, paired};
 use super::rounds::{Stage, StageResult};
 use super::segments::{self, Segment, SegmentCounts};
 use super::state::{BundleEstimate, Camera, Columns};
-use super::statistics::Statistics;
 use super::trajectory::InitialTrajectory;
 use super::{CalibrationError, CalibrationInput, CalibrationOptions, observations, trajectory};
 use crate::estimator::factors::start_prior::StartPrior;
@@ -117,9 +117,9 @@ pub fn calibrate_along(
     let (loops, gaps_m) = close_loops(input, &priors, &frame_sets, &segments, &alone.estimate)?;
 
     let mut start = alone.estimate.clone();
-    start.chain = loops.chain.clone();
+    start.chain = loops.state.chain.clone();
     let mut measured = vec![false; frame_sets.len()];
-    for (segment, joints_rad) in segments.iter().zip(&loops.joints_rad) {
+    for (segment, joints_rad) in segments.iter().zip(&loops.state.joints_rad) {
         for (&frame_set, angles) in segment.frame_sets.iter().zip(joints_rad) {
             start.joints_rad[frame_set].clone_from(angles);
             measured[frame_set] = true;
@@ -148,7 +148,7 @@ pub fn calibrate_along(
             fitting: loops.weights.iter().flatten().filter(|weight| **weight >= 0.5).count(),
             gaps_m,
             position_sigma_m: loops.position_sigma_m,
-            chain: loops.chain.to_classical(),
+            chain: loops.state.chain.to_classical(),
             sigmas: loops.covariance.diagonal().iter().map(|variance| variance.max(0.0).sqrt()).collect(),
             iterations: loops.iterations,
         },
@@ -284,9 +284,8 @@ fn close_loops(
             frame_sets[frame_set].gimbal.as_ref().map_or_else(none, |gimbal| gimbal.encoder.clone())
         },
     );
-    let loops = PoseLoops { segments: &pairs, prior: &priors.border.chain };
-    let solution = loops.solve().ok_or_else(|| singular(LOOPS))?;
-    let gaps = Statistics::of(&loops.gaps_m(&solution)).ok_or_else(|| singular(LOOPS))?;
+    let solution = PoseLoops::new(&pairs, &priors.border.chain).solve().ok_or_else(|| singular(LOOPS))?;
+    let gaps = Statistics::of(&solution.gaps_m).ok_or_else(|| singular(LOOPS))?;
     Ok((solution, gaps))
 }
 

@@ -55,9 +55,4 @@ impl ChainTerm {
     pub(super) fn jacobian(&self) -> &DMatrix<f64> {
         &self.square_root_information
     }
-
-    /// Prior information `WᵀW` (dof × dof).
-    pub(super) fn information(&self) -> DMatrix<f64> {
-        self.square_root_information.tr_mul(&self.square_root_information)
-    }
 }

@@ -24,7 +24,6 @@ mod error;
 mod frame_sets;
 mod imu_noise;
 mod input;
-mod landmark;
 mod observations;
 mod options;
 mod outcome;
@@ -34,7 +33,6 @@ mod rounds;
 mod segments;
 mod solver;
 mod state;
-mod statistics;
 pub mod stills;
 #[cfg(test)]
 mod tests;
@@ -49,7 +47,6 @@ pub use input::{CalibrationInput, EarlierFlights, GimbalCamera, StaticCamera, Tr
 pub use options::CalibrationOptions;
 pub use outcome::{
     CalibratedParameter, CalibrationOutcome, ChainDistance, ExtrinsicsReport, ImuResidualReport, PixelReport,
-    PoseLoopReport, transform_distance,
+    PoseLoopReport, Statistics, transform_distance,
 };
-pub use statistics::Statistics;
 pub use trajectory::InitialTrajectory;

@@ -3,8 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::frame_sets::FrameSet;
-use super::landmark::AnchoredLandmark;
-use super::state::{Camera, ViewId};
+use super::state::{AnchoredLandmark, Camera, ViewId};
 use super::visual::{BundleObservation, BundleTrack, PixelModel};
 use super::{CalibrationInput, CalibrationOptions};
 use crate::frontend::{FeatureId, TrackedFrame};

@@ -3,9 +3,8 @@
 use serde::Serialize;
 
 use super::batch::BatchPose;
-use super::statistics::Statistics;
 use crate::estimator::CalibrationPosterior;
-use crate::geometry::{RigidTransform, so3};
+use crate::geometry::{RigidTransform, median, so3};
 use crate::gimbal::{ClassicalChain, ParameterId, Parameterization};
 use crate::observability::RankReport;
 
@@ -163,4 +162,26 @@ pub fn transform_distance(transform: &RigidTransform, reference: &RigidTransform
         (transform.translation_m - reference.translation_m).norm(),
         so3::log(&(reference.rotation.inverse() * transform.rotation)).norm(),
     )
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Statistics {
+    pub count: usize,
+    pub mean: f64,
+    pub median: f64,
+    /// Standard deviation about the mean.
+    pub std: f64,
+    pub rms: f64,
+}
+
+impl Statistics {
+    /// Statistics of the values, `None` without values.
+    pub fn of(values: &[f64]) -> Option<Self> {
+        let count = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / count;
+        let mean_square = values.iter().map(|value| value * value).sum::<f64>() / count;
+        let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / count;
+        let median = median(values.iter().copied())?;
+        Some(Self { count: values.len(), mean, median, std: variance.sqrt(), rms: mean_square.sqrt() })
+    }
 }

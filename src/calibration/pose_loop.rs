@@ -2,16 +2,17 @@
 //!
 //! The measured poses of a segment have an unknown position, rotation and scale with respect to the map,
 //! estimated together with the joint angles of every view. All unknowns of one segment are eliminated onto the
-//! chain.
+//! chain. Cost: `Σ ρ(|r|²) + Σ (q − reading)²/σ_q² + |W (chain ⊟ given)|²`, over pairs and joints.
 
-use nalgebra::{DMatrix, DVector, Matrix3, Matrix6xX, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{DMatrix, Matrix3, Matrix6xX, UnitQuaternion, Vector3, Vector6};
 
 use super::chain_prior::ChainTerm;
 use super::segments::Segment;
-use crate::geometry::{RigidTransform, median, so3, wrap_angle};
+use crate::estimator::factors::encoder::EncoderResidual;
+use crate::geometry::{RigidTransform, median, so3};
 use crate::gimbal::Chain;
-use crate::optimization::RobustLoss;
-use crate::optimization::damped::{DampedOptions, DampedProblem, minimize};
+use crate::optimization::damped::{DampedOptions, LeastSquares, minimize};
+use crate::optimization::{RobustLoss, TwoLevelEquations, TwoLevelStep};
 use crate::sensors::JointAngles;
 
 /// Standard deviation of the rotation of a measured pose, in radians: a pixel over the root of the number of features.
@@ -24,7 +25,14 @@ const MIN_POSITION_SIGMA_M: f64 = 2e-3;
 const CAUCHY_SIGMAS: f64 = 3.0;
 /// Number of estimations of the position noise.
 const ROUNDS: usize = 4;
-const ITERATIONS: usize = 25;
+const OPTIONS: DampedOptions = DampedOptions {
+    iterations: 25,
+    relative_cost_tolerance: 1e-8,
+    first_damping: 1e-4,
+    min_damping: 1e-10,
+    max_damping: 1e10,
+    growth: 20.0,
+};
 /// Number of columns of a segment's frame: rotation, translation, logarithm of the scale.
 const FRAME: usize = 7;
 /// Median length of a three-dimensional normal error, in standard deviations of a coordinate.
@@ -40,9 +48,13 @@ pub(super) struct PosePair {
 }
 
 impl PosePair {
-    /// Reading and standard deviation of each joint.
-    fn readings(&self) -> impl Iterator<Item = (&f64, &f64)> {
-        self.encoder.angles_rad.iter().zip(&self.encoder.sigmas_rad)
+    /// Residual of each joint's reading at its angle.
+    fn encoder_residuals(&self, angles_rad: &[f64]) -> impl Iterator<Item = EncoderResidual> {
+        let readings = self.encoder.angles_rad.iter().zip(&self.encoder.sigmas_rad);
+        angles_rad
+            .iter()
+            .zip(readings)
+            .map(|(angle, (reading, sigma))| EncoderResidual::new(*angle, 0.0, 0.0, *reading, *sigma))
     }
 }
 
@@ -92,14 +104,13 @@ impl SegmentFrame {
 
 #[derive(Clone, Debug)]
 pub(super) struct PoseLoopSolution {
-    pub(super) chain: Chain,
-    /// Joint angles by segment and pair, in radians.
-    pub(super) joints_rad: Vec<Vec<Vec<f64>>>,
-    pub(super) frames: Vec<SegmentFrame>,
+    pub(super) state: LoopState,
     /// Covariance of the chain's columns (dof × dof).
     pub(super) covariance: DMatrix<f64>,
     /// Standard deviation of a measured position per coordinate, estimated from the residuals.
     pub(super) position_sigma_m: f64,
+    /// Position gap of each loop.
+    pub(super) gaps_m: Vec<f64>,
     /// Robust weight of each pair, 0 to 1, by segment.
     pub(super) weights: Vec<Vec<f64>>,
     pub(super) iterations: usize,
@@ -118,11 +129,13 @@ pub(super) struct LoopNoise {
 pub(super) struct PoseLoops<'a> {
     pub(super) segments: &'a [PairedSegment],
     pub(super) prior: &'a ChainTerm,
+    pub(super) noise: LoopNoise,
 }
 
 #[derive(Clone, Debug)]
 pub(super) struct LoopState {
     pub(super) chain: Chain,
+    /// Joint angles by segment and pair, in radians.
     pub(super) joints_rad: Vec<Vec<Vec<f64>>>,
     pub(super) frames: Vec<SegmentFrame>,
 }
@@ -134,67 +147,47 @@ pub(super) struct PairRows {
     pub(super) by_chain: Matrix6xX<f64>,
 }
 
-/// Normal equations of the loops: block of the chain, and blocks of each segment.
-#[derive(Clone)]
-struct LoopEquations {
-    hessian: DMatrix<f64>,
-    gradient: DVector<f64>,
-    segments: Vec<SegmentEquations>,
-}
+impl<'a> PoseLoops<'a> {
+    pub(super) fn new(segments: &'a [PairedSegment], prior: &'a ChainTerm) -> Self {
+        Self { segments, prior, noise: INITIAL_NOISE }
+    }
 
-/// Blocks of one segment: its frame and the joint angles of its views.
-#[derive(Clone)]
-struct SegmentEquations {
-    own: DMatrix<f64>,
-    /// Coupling of the segment's unknowns (rows) with the chain (columns).
-    coupling: DMatrix<f64>,
-    gradient: DVector<f64>,
-}
-
-type SegmentFactor = nalgebra::linalg::Cholesky<f64, nalgebra::Dyn>;
-
-impl PoseLoops<'_> {
     /// Solves from the given chain and the readings; `None` when the equations are singular.
-    pub(super) fn solve(&self) -> Option<PoseLoopSolution> {
+    pub(super) fn solve(&mut self) -> Option<PoseLoopSolution> {
         let chain = self.prior.given.clone();
-        let joints_rad: Vec<Vec<Vec<f64>>> = self
-            .segments
-            .iter()
-            .map(|pairs| pairs.iter().map(|pair| pair.encoder.angles_rad.clone()).collect())
-            .collect();
+        let of_pairs = |pairs: &PairedSegment| pairs.iter().map(|pair| pair.encoder.angles_rad.clone()).collect();
+        let joints_rad = self.segments.iter().map(of_pairs).collect();
         let frames = self.segments.iter().map(|pairs| first_frame(pairs, &chain)).collect();
         let mut state = LoopState { chain, joints_rad, frames };
-        let mut noise = INITIAL_NOISE;
         let mut iterations = 0;
         let mut covariance = None;
+        let mut gaps_m = Vec::new();
         for _ in 0..ROUNDS {
-            let (next, used) = self.adjust(state, &noise);
-            covariance = self.covariance(&next, &noise);
-            state = next;
-            iterations += used;
-            let lengths = self.each_pair().map(|(segment, pair)| self.position_error(&state, segment, pair).norm());
-            let spread_m = median(lengths)? / MEDIAN_LENGTH;
-            noise = LoopNoise {
+            let solution = minimize(self, state, &OPTIONS);
+            state = solution.estimate;
+            iterations += solution.tried;
+            covariance = self.linearize(&state).common_covariance();
+            let gap_m = |(segment, pair)| {
+                self.residual(&state, segment, pair).fixed_rows::<3>(3).norm() * self.noise.position_m
+            };
+            gaps_m = self.each_pair().map(gap_m).collect();
+            let spread_m = median(gaps_m.iter().copied())? / MEDIAN_LENGTH;
+            self.noise = LoopNoise {
                 rotation_rad: ROTATION_SIGMA_RAD,
                 position_m: (spread_m * self.lost_freedom()).max(MIN_POSITION_SIGMA_M),
                 loss: RobustLoss::Cauchy(CAUCHY_SIGMAS),
             };
         }
-        let weights = (0..self.segments.len())
-            .map(|segment| {
-                let weight = |pair| {
-                    noise.loss.cost_and_weight(self.rows(&state, segment, pair, &noise).residual.norm_squared()).1
-                };
-                (0..self.segments[segment].len()).map(weight).collect()
-            })
-            .collect();
+        let weights = (0..self.segments.len()).map(|segment| {
+            let square = |pair| self.residual(&state, segment, pair).norm_squared();
+            (0..self.segments[segment].len()).map(|pair| self.noise.loss.cost_and_weight(square(pair)).1).collect()
+        });
         Some(PoseLoopSolution {
-            chain: state.chain,
-            joints_rad: state.joints_rad,
-            frames: state.frames,
+            weights: weights.collect(),
             covariance: covariance?,
-            position_sigma_m: noise.position_m,
-            weights,
+            position_sigma_m: self.noise.position_m,
+            state,
+            gaps_m,
             iterations,
         })
     }
@@ -206,208 +199,99 @@ impl PoseLoops<'_> {
         if free > 0.0 { (coordinates / free).sqrt() } else { 1.0 }
     }
 
-    /// Position gaps of the loops, in metres.
-    pub(super) fn gaps_m(&self, solution: &PoseLoopSolution) -> Vec<f64> {
-        let state = LoopState {
-            chain: solution.chain.clone(),
-            joints_rad: solution.joints_rad.clone(),
-            frames: solution.frames.clone(),
-        };
-        self.each_pair().map(|(segment, pair)| self.position_error(&state, segment, pair).norm()).collect()
-    }
-
     fn each_pair(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         self.segments.iter().enumerate().flat_map(|(segment, pairs)| (0..pairs.len()).map(move |pair| (segment, pair)))
     }
 
-    fn position_error(&self, state: &LoopState, segment: usize, pair: usize) -> Vector3<f64> {
+    /// Whitened residual of one pair,
+    /// `r = [Log(R_Bᵀ R_A) / σ_R; (t_A − t_B) / σ_t]` with `A = T_WI·T_IC(q)` and `B = T_WS·[R_SC, s·t_SC]`:
+    /// vehicle and chain against the measured pose in its segment of scale `s`.
+    fn residual(&self, state: &LoopState, segment: usize, pair: usize) -> Vector6<f64> {
         let measured = &self.segments[segment][pair];
-        let predicted = measured.world_from_imu * state.chain.imu_from_camera(&state.joints_rad[segment][pair]);
-        predicted.translation_m - state.frames[segment].world_from_camera(&measured.segment_from_camera).translation_m
+        let a = measured.world_from_imu * state.chain.imu_from_camera(&state.joints_rad[segment][pair]);
+        let b = state.frames[segment].world_from_camera(&measured.segment_from_camera);
+        let rotation = so3::log(&(b.rotation.inverse() * a.rotation)) / self.noise.rotation_rad;
+        let position = (a.translation_m - b.translation_m) / self.noise.position_m;
+        Vector6::from_iterator(rotation.iter().chain(&position).copied())
     }
 
-    /// Whitened residual and Jacobian rows of one pair.
-    pub(super) fn rows(&self, state: &LoopState, segment: usize, pair: usize, noise: &LoopNoise) -> PairRows {
-        let measured = &self.segments[segment][pair];
-        let frame = &state.frames[segment];
+    /// [`Self::residual`] with its derivatives (6 × n each), `J = J_r⁻¹(Log(R_Bᵀ R_A))`:
+    ///
+    /// ```text
+    /// by [φ; δt] of T_IC:                [J / σ_R, 0; 0, R_WI / σ_t]
+    /// by [φ; δt; δ ln s] of the segment: [−Jᵀ R_SCᵀ / σ_R, 0, 0; R_WS [s·t_SC]× / σ_t, −I / σ_t, −R_WS·s·t_SC / σ_t]
+    /// ```
+    pub(super) fn rows(&self, state: &LoopState, segment: usize, pair: usize) -> PairRows {
+        let (measured, frame, noise) = (&self.segments[segment][pair], &state.frames[segment], &self.noise);
         let chain = state.chain.linearize(&state.joints_rad[segment][pair]);
-        let predicted = measured.world_from_imu * chain.imu_from_camera;
-        let on_map = frame.world_from_camera(&measured.segment_from_camera);
-        let rotation_error = so3::log(&(on_map.rotation.inverse() * predicted.rotation));
-        let shift = predicted.translation_m - on_map.translation_m;
-        let (rotation, position) = (1.0 / noise.rotation_rad, 1.0 / noise.position_m);
-        let mut residual = Vector6::zeros();
-        residual.fixed_rows_mut::<3>(0).copy_from(&(rotation_error * rotation));
-        residual.fixed_rows_mut::<3>(3).copy_from(&(shift * position));
-
-        let by_rotation_error = so3::right_jacobian_inverse(&rotation_error);
-        let world_from_imu = measured.world_from_imu.rotation_matrix();
-        let carried = |part: &Matrix6xX<f64>| {
-            let mut rows = part.clone();
-            let rotation_rows = by_rotation_error * part.fixed_rows::<3>(0) * rotation;
-            rows.fixed_rows_mut::<3>(0).copy_from(&rotation_rows);
-            let shifted = world_from_imu * part.fixed_rows::<3>(3) * position;
-            rows.fixed_rows_mut::<3>(3).copy_from(&shifted);
+        let residual = self.residual(state, segment, pair);
+        let j = so3::right_jacobian_inverse(&(residual.fixed_rows::<3>(0) * noise.rotation_rad)) / noise.rotation_rad;
+        let r_wi: Matrix3<f64> = measured.world_from_imu.rotation_matrix() / noise.position_m;
+        let of_chain = |by_pose: &Matrix6xX<f64>| {
+            let mut rows = by_pose.clone();
+            rows.fixed_rows_mut::<3>(0).copy_from(&(j * by_pose.fixed_rows::<3>(0)));
+            rows.fixed_rows_mut::<3>(3).copy_from(&(r_wi * by_pose.fixed_rows::<3>(3)));
             rows
         };
-        let segment_rotation: Matrix3<f64> = frame.world_from_segment.rotation_matrix();
-        let camera_from_segment: Matrix3<f64> = measured.segment_from_camera.rotation_matrix().transpose();
-        let place = measured.segment_from_camera.translation_m * frame.metres_per_unit;
+        let r_sc: Matrix3<f64> = measured.segment_from_camera.rotation_matrix();
+        let r_ws: Matrix3<f64> = frame.world_from_segment.rotation_matrix() / noise.position_m;
+        let t_sc = measured.segment_from_camera.translation_m * frame.metres_per_unit;
         let mut by_frame = Matrix6xX::zeros(FRAME);
-        by_frame
-            .fixed_view_mut::<3, 3>(0, 0)
-            .copy_from(&(by_rotation_error.transpose() * camera_from_segment * -rotation));
-        by_frame.fixed_view_mut::<3, 3>(3, 0).copy_from(&(segment_rotation * so3::hat(&place) * position));
-        by_frame.fixed_view_mut::<3, 3>(3, 3).fill_diagonal(-position);
-        by_frame.fixed_view_mut::<3, 1>(3, 6).copy_from(&(segment_rotation * place * -position));
-        PairRows { residual, by_frame, by_joints: carried(&chain.by_joints), by_chain: carried(&chain.by_parameters) }
+        by_frame.fixed_view_mut::<3, 3>(0, 0).copy_from(&-(j.transpose() * r_sc.transpose()));
+        by_frame.fixed_view_mut::<3, 3>(3, 0).copy_from(&(r_ws * so3::hat(&t_sc)));
+        by_frame.fixed_view_mut::<3, 3>(3, 3).fill_diagonal(-1.0 / noise.position_m);
+        by_frame.fixed_view_mut::<3, 1>(3, 6).copy_from(&-(r_ws * t_sc));
+        PairRows { residual, by_frame, by_joints: of_chain(&chain.by_joints), by_chain: of_chain(&chain.by_parameters) }
     }
+}
 
-    fn cost(&self, state: &LoopState, noise: &LoopNoise) -> f64 {
+impl LeastSquares for PoseLoops<'_> {
+    type Estimate = LoopState;
+    /// The chain's columns are common; frame and joint angles of a segment are a group.
+    type Equations = TwoLevelEquations;
+
+    fn cost(&self, state: &LoopState) -> f64 {
         let mut cost = self.prior.residual(&state.chain).norm_squared();
         for (segment, pair) in self.each_pair() {
-            let measured = &self.segments[segment][pair];
-            let predicted = measured.world_from_imu * state.chain.imu_from_camera(&state.joints_rad[segment][pair]);
-            let on_map = state.frames[segment].world_from_camera(&measured.segment_from_camera);
-            let rotation_error = so3::log(&(on_map.rotation.inverse() * predicted.rotation)) / noise.rotation_rad;
-            let shift = (predicted.translation_m - on_map.translation_m) / noise.position_m;
-            cost += noise.loss.cost_and_weight(rotation_error.norm_squared() + shift.norm_squared()).0;
-            for (angle, (reading, sigma)) in state.joints_rad[segment][pair].iter().zip(measured.readings()) {
-                cost += (wrap_angle(angle - reading) / sigma).powi(2);
+            cost += self.noise.loss.cost_and_weight(self.residual(state, segment, pair).norm_squared()).0;
+            for encoder in self.segments[segment][pair].encoder_residuals(&state.joints_rad[segment][pair]) {
+                cost += encoder.residual.powi(2);
             }
         }
         cost
     }
 
-    /// Adjusts the loops from a state; returns the state and the number of tried steps.
-    fn adjust(&self, start: LoopState, noise: &LoopNoise) -> (LoopState, usize) {
-        let options = DampedOptions {
-            iterations: ITERATIONS,
-            relative_cost_tolerance: 1e-8,
-            first_damping: 1e-4,
-            min_damping: 1e-10,
-            max_damping: 1e10,
-            growth: 20.0,
-        };
-        let solution = minimize(&mut DampedLoops { loops: self, noise }, start, &options);
-        (solution.estimate, solution.tried)
-    }
-
-    /// Covariance of the chain's columns at a state (dof × dof), all other unknowns marginalized; `None` when the
-    /// equations are singular.
-    fn covariance(&self, state: &LoopState, noise: &LoopNoise) -> Option<DMatrix<f64>> {
-        let mut equations = self.linearize(state, noise);
-        equations.eliminate(0.0)?;
-        Some(equations.hessian.cholesky()?.inverse())
-    }
-
-    fn linearize(&self, state: &LoopState, noise: &LoopNoise) -> LoopEquations {
-        let mut hessian = self.prior.information();
-        let mut gradient = self.prior.jacobian().tr_mul(&self.prior.residual(&state.chain));
-        let segments = (0..self.segments.len())
-            .map(|segment| self.segment_equations(state, segment, noise, &mut hessian, &mut gradient))
-            .collect();
-        LoopEquations { hessian, gradient, segments }
-    }
-
-    /// Normal equations of one segment; blocks of the chain only are added to `hessian` and `gradient`.
-    fn segment_equations(
-        &self,
-        state: &LoopState,
-        segment: usize,
-        noise: &LoopNoise,
-        hessian: &mut DMatrix<f64>,
-        gradient: &mut DVector<f64>,
-    ) -> SegmentEquations {
+    fn linearize(&self, state: &LoopState) -> TwoLevelEquations {
         let joints = state.chain.joint_count();
-        let pairs = &self.segments[segment];
-        let size = FRAME + joints * pairs.len();
-        let mut own = DMatrix::zeros(size, size);
-        let mut coupling = DMatrix::zeros(size, state.chain.dof());
-        let mut own_gradient = DVector::zeros(size);
-        for (pair, measured) in pairs.iter().enumerate() {
-            let rows = self.rows(state, segment, pair, noise);
-            let weight = noise.loss.cost_and_weight(rows.residual.norm_squared()).1;
+        let sizes: Vec<usize> = self.segments.iter().map(|pairs| FRAME + joints * pairs.len()).collect();
+        let mut equations = TwoLevelEquations::zeros(&sizes, state.chain.dof());
+        equations.common.add(&self.prior.residual(&state.chain), self.prior.jacobian(), 1.0);
+        for (segment, pair) in self.each_pair() {
+            let rows = self.rows(state, segment, pair);
+            let weight = self.noise.loss.cost_and_weight(rows.residual.norm_squared()).1;
             let at = FRAME + joints * pair;
-            let parts = [(0, &rows.by_frame), (at, &rows.by_joints)];
-            for (row, left) in parts {
-                for (column, right) in parts {
-                    let mut place = own.view_mut((row, column), (left.ncols(), right.ncols()));
-                    place += left.tr_mul(right) * weight;
-                }
-                let mut place = coupling.rows_mut(row, left.ncols());
-                place += left.tr_mul(&rows.by_chain) * weight;
-                let mut place = own_gradient.rows_mut(row, left.ncols());
-                place += left.tr_mul(&rows.residual) * weight;
-            }
-            *hessian += rows.by_chain.tr_mul(&rows.by_chain) * weight;
-            *gradient += rows.by_chain.tr_mul(&rows.residual) * weight;
-            for (joint, (angle, (reading, sigma))) in
-                state.joints_rad[segment][pair].iter().zip(measured.readings()).enumerate()
-            {
-                let information = 1.0 / (sigma * sigma);
-                own[(at + joint, at + joint)] += information;
-                own_gradient[at + joint] += information * wrap_angle(angle - reading);
+            let own = [(0, &rows.by_frame), (at, &rows.by_joints)];
+            equations.add(segment, &rows.residual, &own, &[(0, &rows.by_chain)], weight);
+            let own = &mut equations.groups[segment].own;
+            let encoders = self.segments[segment][pair].encoder_residuals(&state.joints_rad[segment][pair]);
+            for (column, encoder) in (at..).zip(encoders) {
+                own.hessian[(column, column)] += encoder.by_angle * encoder.by_angle;
+                own.gradient[column] += encoder.by_angle * encoder.residual;
             }
         }
-        SegmentEquations { own, coupling, gradient: own_gradient }
-    }
-}
-
-impl LoopEquations {
-    /// Eliminates every segment onto the chain, after multiplication of the segments' diagonals by `1 + damping`, and
-    /// returns their damped factors; `None` when one is singular.
-    fn eliminate(&mut self, damping: f64) -> Option<Vec<SegmentFactor>> {
-        let mut factors = Vec::with_capacity(self.segments.len());
-        for segment in &self.segments {
-            let mut damped = segment.own.clone();
-            for k in 0..damped.nrows() {
-                damped[(k, k)] *= 1.0 + damping;
-            }
-            let factor = damped.cholesky()?;
-            self.hessian -= segment.coupling.tr_mul(&factor.solve(&segment.coupling));
-            self.gradient -= segment.coupling.tr_mul(&factor.solve(&segment.gradient));
-            factors.push(factor);
-        }
-        Some(factors)
-    }
-}
-
-/// The pose loops as a problem of the damped solver.
-struct DampedLoops<'a> {
-    loops: &'a PoseLoops<'a>,
-    noise: &'a LoopNoise,
-}
-
-impl DampedProblem for DampedLoops<'_> {
-    type Estimate = LoopState;
-    type Equations = LoopEquations;
-
-    fn cost(&self, state: &LoopState) -> f64 {
-        self.loops.cost(state, self.noise)
+        equations
     }
 
-    fn linearize(&self, state: &LoopState) -> LoopEquations {
-        self.loops.linearize(state, self.noise)
-    }
-
-    fn step(&mut self, state: &LoopState, equations: &LoopEquations, damping: f64) -> Option<LoopState> {
-        let mut reduced = equations.clone();
-        let factors = reduced.eliminate(damping)?;
-        for k in 0..reduced.hessian.nrows() {
-            reduced.hessian[(k, k)] *= 1.0 + damping;
-        }
-        let delta = -reduced.hessian.cholesky()?.solve(&reduced.gradient);
+    fn plus(&self, state: &LoopState, step: &TwoLevelStep) -> LoopState {
         let mut next = state.clone();
-        next.chain = state.chain.plus(&delta);
-        for (segment, (part, factor)) in equations.segments.iter().zip(&factors).enumerate() {
-            let own = -factor.solve(&(&part.gradient + &part.coupling * &delta));
+        next.chain = state.chain.plus(&step.common);
+        for (segment, own) in step.groups.iter().enumerate() {
             next.frames[segment] = state.frames[segment].plus(&own.as_slice()[..FRAME]);
             for (angle, step) in next.joints_rad[segment].iter_mut().flatten().zip(own.iter().skip(FRAME)) {
                 *angle += step;
             }
         }
-        Some(next)
+        next
     }
 }
 
@@ -425,8 +309,7 @@ fn first_frame(pairs: &[PosePair], chain: &Chain) -> SegmentFrame {
     for _ in 0..5 {
         let sum: Vector3<f64> =
             rotations.iter().map(|rotation_error| so3::log(&(rotation.inverse() * rotation_error))).sum();
-        rotation =
-            UnitQuaternion::new_normalize((rotation * so3::exp(&(sum / rotations.len().max(1) as f64))).into_inner());
+        rotation = so3::plus(&rotation, &(sum / rotations.len().max(1) as f64));
     }
     let count = pairs.len().max(1) as f64;
     let rotation_rows: Vec<Vector3<f64>> =

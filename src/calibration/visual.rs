@@ -5,8 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Vector2, Vector3};
 use rayon::prelude::*;
 
-use super::landmark::AnchoredLandmark;
-use super::state::ViewId;
+use super::state::{AnchoredLandmark, ViewId};
 use crate::camera::CameraModel;
 use crate::optimization::{
     CameraPose, ReducedEquations, RelativePose, ReprojectionEquations, RobustLoss, SparsePoseEquations, reprojection,

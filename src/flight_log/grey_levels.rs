@@ -1,5 +1,7 @@
 //! Conversion of 16-bit grey values to 8 bits, by the values that a recording uses.
 
+use crate::geometry::median;
+
 /// Lowest and highest value of an image, without this ratio of its pixels on either side: dead pixels and small hot or
 /// cold objects do not determine the contrast.
 pub(crate) const OUTSIDE_RATIO: f64 = 0.005;
@@ -109,12 +111,8 @@ impl GreyLevels {
         let images = || stretches.iter().flat_map(|(_, images)| images);
         let Some(brightest) = images().map(|image| image.brightest).max() else { return Self::default() };
         let bits = (u16::BITS - brightest.leading_zeros()).next_multiple_of(2).max(8);
-        let median = |mut values: Vec<f64>| {
-            values.sort_by(f64::total_cmp);
-            values.get(values.len() / 2).copied()
-        };
         let of_images = |images: &[ValueRange], value: fn(&ValueRange) -> u16| {
-            median(images.iter().map(|image| f64::from(value(image))).collect())
+            median(images.iter().map(|image| f64::from(value(image))))
         };
         let measured: Vec<RangeAt> = stretches
             .iter()
@@ -123,7 +121,7 @@ impl GreyLevels {
                 Some(RangeAt { log_time_ns: *log_time_ns, low, high })
             })
             .collect();
-        let usual = median(measured.iter().map(|range| range.high - range.low).collect()).unwrap_or(0.0);
+        let usual = median(measured.iter().map(|range| range.high - range.low)).unwrap_or(0.0);
         let is_used = bits == 8 || usual >= ENOUGH_LEVELS * f64::from(1_u32 << (bits - 8));
         let least = MIN_RANGE.max(MIN_RANGE_RATIO * usual);
         let ranges = if is_used { Vec::new() } else { smoothed(&measured, least) };

@@ -1,5 +1,5 @@
 //! Rotations, rigid transforms and the perturbation rule; tangent plane of a direction, mean and spread of
-//! vectors, median, quantiles of χ².
+//! vectors, median, quantiles of χ², t and F.
 //!
 //! The rule is written here once: a perturbation is `[φ; δt]`, rotation first, with `R ← R·Exp(φ)` (right, local) and
 //! `t ← t + δt` (a vector in the outer frame).
@@ -12,20 +12,21 @@ mod scalars;
 mod signed_axes;
 pub mod so3;
 mod split_mix;
+mod statistics;
 #[cfg(test)]
 mod tests;
 pub(crate) mod triangular_factor;
-mod vector_statistics;
-mod wahba;
 
 pub use dimension::Dimension;
 pub use rigid_transform::RigidTransform;
 pub(crate) use scalars::planar_length;
 pub use scalars::{
-    MEDIAN_PLANAR_LENGTH, SIGMA_PER_MEDIAN, mean_square_quantile, median, ns_from_seconds, principal_angle, quantile,
-    seconds_from_ns, smooth_step, tangent_basis, vertical_angle, wrap_angle,
+    ns_from_seconds, principal_angle, seconds_from_ns, smooth_step, tangent_basis, vertical_angle, wrap_angle,
 };
 pub use signed_axes::SignedAxes;
+pub use so3::best_rotation;
 pub use split_mix::SplitMix64;
-pub use vector_statistics::{mean, standard_deviation};
-pub use wahba::best_rotation;
+pub use statistics::{
+    MEDIAN_PLANAR_LENGTH, SIGMA_PER_MEDIAN, consecutive_correlation, correlation, f_survival, mean,
+    mean_square_quantile, median, quantile, standard_deviation, t_quantile,
+};

@@ -72,8 +72,7 @@ impl RigidTransform {
     #[must_use]
     pub fn plus(&self, delta: &Vector6<f64>) -> Self {
         let phi = Vector3::new(delta[0], delta[1], delta[2]);
-        let rotation = UnitQuaternion::new_normalize((self.rotation * so3::exp(&phi)).into_inner());
-        Self::new(rotation, self.translation_m + Vector3::new(delta[3], delta[4], delta[5]))
+        Self::new(so3::plus(&self.rotation, &phi), self.translation_m + Vector3::new(delta[3], delta[4], delta[5]))
     }
 
     /// `self ⊟ origin`, the `[φ; δt]` with `origin.plus([φ; δt]) = self`.

@@ -1,6 +1,6 @@
-//! Exponential, logarithm and right Jacobians of SO(3); angles in radians.
+//! Exponential, logarithm, perturbations and right Jacobians of SO(3), and the best rotation between vectors; angles in radians.
 
-use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 /// Below this angle (rad) the series of the Jacobians replace the closed forms.
 const SMALL_ANGLE_RAD: f64 = 1e-4;
@@ -13,6 +13,18 @@ pub fn hat(v: &Vector3<f64>) -> Matrix3<f64> {
 /// `Exp(φ)` for a rotation vector in radians.
 pub fn exp(phi: &Vector3<f64>) -> UnitQuaternion<f64> {
     UnitQuaternion::from_scaled_axis(*phi)
+}
+
+/// `R ⊞ φ = R·Exp(φ)`, normalized: the perturbation on the right, in the inner frame.
+#[must_use]
+pub fn plus(rotation: &UnitQuaternion<f64>, phi: &Vector3<f64>) -> UnitQuaternion<f64> {
+    UnitQuaternion::new_normalize((rotation * exp(phi)).into_inner())
+}
+
+/// `Exp(φ)·R`, normalized: the left form that the paper's Eqs. 12–14 print, `φ` in the outer frame, `φ = R·φ_right`.
+#[must_use]
+pub fn plus_left(rotation: &UnitQuaternion<f64>, phi: &Vector3<f64>) -> UnitQuaternion<f64> {
+    UnitQuaternion::new_normalize((exp(phi) * rotation).into_inner())
 }
 
 /// Rotation vector (rad) of a body over `duration_s` whose angular rate (rad/s, body frame) changes linearly from
@@ -59,4 +71,16 @@ pub fn right_jacobian_inverse(phi: &Vector3<f64>) -> Matrix3<f64> {
     }
     let factor = 1.0 / (angle * angle) - (1.0 + angle.cos()) / (2.0 * angle * angle.sin());
     Matrix3::identity() + k * 0.5 + k * k * factor
+}
+
+/// Rotation that minimizes `Σ |measured − R·predicted|²` over pairs `(predicted, measured)` (Wahba's problem, by SVD),
+/// with the ratio of the second singular value to the first, which is near zero if all vectors are along one axis.
+pub fn best_rotation(pairs: &[(Vector3<f64>, Vector3<f64>)]) -> Option<(UnitQuaternion<f64>, f64)> {
+    let sum: Matrix3<f64> = pairs.iter().map(|(predicted, measured)| measured * predicted.transpose()).sum();
+    let svd = sum.svd(true, true);
+    let (u, v_t) = (svd.u?, svd.v_t?);
+    let mut handed = Matrix3::identity();
+    handed[(2, 2)] = (u * v_t).determinant().signum();
+    let rotation = Rotation3::from_matrix_unchecked(u * handed * v_t);
+    Some((UnitQuaternion::from_rotation_matrix(&rotation), svd.singular_values[1] / svd.singular_values[0].max(1e-12)))
 }

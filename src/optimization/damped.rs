@@ -1,5 +1,50 @@
-//! Levenberg–Marquardt with Marquardt's scaling: `(H + λ diag H) δ = −g`. `λ` decreases after a step that lowers the
-//! cost and increases after one that does not.
+//! Levenberg–Marquardt with Marquardt's scaling: `(H + λ diag H) δ = −g` (Marquardt, *An Algorithm for Least-Squares
+//! Estimation of Nonlinear Parameters*, 1963). `λ` decreases after a step that lowers the cost and increases after one that
+//! does not.
+//!
+//! A problem is a [`LeastSquares`]: its cost, its normal equations and its step on the manifold. One that eliminates
+//! unknowns by its own structure, as the landmarks of a window, is a [`DampedProblem`].
+
+/// Normal equations `H δ = −g`, solved for damped steps.
+pub(crate) trait DampedEquations {
+    type Step;
+
+    /// Solves `(H + λ diag H) δ = −g`; `None` unless the matrix is positive definite.
+    fn solve(&self, damping: f64) -> Option<Self::Step>;
+}
+
+/// Least-squares problem whose equations are solved by themselves: dense ([`super::NormalEquations`]) or with groups of
+/// unknowns ([`super::TwoLevelEquations`]).
+pub(crate) trait LeastSquares {
+    type Estimate;
+    type Equations: DampedEquations;
+
+    /// Sum of the squared whitened residuals, each by its robust loss.
+    fn cost(&self, estimate: &Self::Estimate) -> f64;
+
+    /// `H` and `g` of the residuals at an estimate.
+    fn linearize(&self, estimate: &Self::Estimate) -> Self::Equations;
+
+    /// Estimate `x ⊞ δ`.
+    fn plus(&self, estimate: &Self::Estimate, step: &<Self::Equations as DampedEquations>::Step) -> Self::Estimate;
+}
+
+impl<P: LeastSquares> DampedProblem for P {
+    type Estimate = P::Estimate;
+    type Equations = P::Equations;
+
+    fn cost(&self, estimate: &P::Estimate) -> f64 {
+        LeastSquares::cost(self, estimate)
+    }
+
+    fn linearize(&self, estimate: &P::Estimate) -> P::Equations {
+        LeastSquares::linearize(self, estimate)
+    }
+
+    fn step(&mut self, estimate: &P::Estimate, equations: &P::Equations, damping: f64) -> Option<P::Estimate> {
+        Some(self.plus(estimate, &equations.solve(damping)?))
+    }
+}
 
 /// Least-squares problem whose normal equations can be damped.
 pub(crate) trait DampedProblem {

@@ -1,17 +1,16 @@
 //! Shared parts of all least-squares problems: landmark with its triangulation, reprojection residual with its
-//! Jacobians, robust loss, elimination of landmarks, damped solver.
+//! Jacobians, robust loss, elimination of landmarks, normal equations, damped solver and Gauss–Newton.
 //!
 //! Residuals are predicted minus measured; poses are perturbed by the rule of [`crate::geometry`]. A problem has
 //! separate unknowns and assembly: it linearizes observations by camera poses here (`reprojection`), eliminates the
 //! landmarks by QR (`LandmarkRows`) or by the Schur complement (`ReprojectionEquations`), converts the result to its
 //! unknowns, and is solved by `damped::minimize`.
 
-mod block_term;
 mod cholesky;
 pub(crate) mod damped;
-pub(crate) mod dense;
 mod landmark;
 mod landmark_rows;
+mod normal_equations;
 mod pose_blocks;
 pub(crate) mod reprojection;
 mod robust_loss;
@@ -19,15 +18,17 @@ mod schur;
 #[cfg(test)]
 mod tests;
 mod triangulation;
+mod two_level;
 
-pub(crate) use block_term::{BlockTerm, PoseBlocksOf};
 pub(crate) use cholesky::{Cholesky, DIAGONAL_FLOOR};
 pub(crate) use landmark::Landmark;
 pub use landmark::LandmarkModel;
 pub(crate) use landmark_rows::{LandmarkRows, OBSERVATION_ROWS};
-pub(crate) use pose_blocks::PoseBlocks;
+pub(crate) use normal_equations::{NormalEquations, damp, fix, gauss_newton};
+pub(crate) use pose_blocks::{BlockTerm, PoseBlocks, PoseBlocksOf};
 pub(crate) use reprojection::{CameraPose, RelativePose, RelativePoses, Reprojection};
 pub(crate) use robust_loss::LossSum;
 pub use robust_loss::RobustLoss;
 pub(crate) use schur::{DensePoseEquations, ReducedEquations, ReprojectionEquations, SparsePoseEquations};
 pub(crate) use triangulation::{Ray, TriangulationOptions, triangulate};
+pub(crate) use two_level::{TwoLevelEquations, TwoLevelPosterior, TwoLevelStep};

@@ -1,10 +1,11 @@
-use nalgebra::{DMatrix, DVector, Matrix2, Vector2, Vector3, Vector6};
+use nalgebra::{Const, DMatrix, DVector, Dyn, Matrix2, Vector2, Vector3, Vector6};
 
-use super::damped::{DampedOptions, DampedProblem, StopReason, minimize};
+use super::damped::{DampedEquations, DampedOptions, DampedProblem, StopReason, minimize};
 use super::reprojection::{self, BearingProjection, TangentPlane};
 use super::{
-    BlockTerm, CameraPose, Cholesky, DensePoseEquations, Landmark, LandmarkRows, LossSum, Ray, RelativePose,
-    Reprojection, ReprojectionEquations, RobustLoss, TriangulationOptions, triangulate,
+    BlockTerm, CameraPose, Cholesky, DensePoseEquations, Landmark, LandmarkRows, LossSum, NormalEquations, Ray,
+    RelativePose, Reprojection, ReprojectionEquations, RobustLoss, TriangulationOptions, TwoLevelEquations,
+    gauss_newton, triangulate,
 };
 use crate::camera::{self, CameraModel, Distortion};
 use crate::geometry::{RigidTransform, SplitMix64, so3};
@@ -193,7 +194,7 @@ struct Valley {
 
 impl DampedProblem for Valley {
     type Estimate = Vector2<f64>;
-    type Equations = (Matrix2<f64>, Vector2<f64>);
+    type Equations = NormalEquations<Const<2>>;
 
     fn cost(&self, at: &Vector2<f64>) -> f64 {
         (1.0 - at.x).powi(2) + 100.0 * (at.y - at.x * at.x).powi(2)
@@ -202,14 +203,15 @@ impl DampedProblem for Valley {
     fn linearize(&self, at: &Vector2<f64>) -> Self::Equations {
         let jacobian = Matrix2::new(-1.0, 0.0, -20.0 * at.x, 10.0);
         let residual = Vector2::new(1.0 - at.x, 10.0 * (at.y - at.x * at.x));
-        (jacobian.tr_mul(&jacobian), jacobian.tr_mul(&residual))
+        let mut equations = NormalEquations::zeros(Const);
+        equations.add(&residual, &jacobian, 1.0);
+        equations
     }
 
-    fn step(&mut self, at: &Vector2<f64>, (hessian, gradient): &Self::Equations, damping: f64) -> Option<Vector2<f64>> {
-        let damped = hessian + Matrix2::from_diagonal(&(hessian.diagonal() * damping));
-        let step = damped.cholesky()?.solve(gradient);
+    fn step(&mut self, at: &Vector2<f64>, equations: &Self::Equations, damping: f64) -> Option<Vector2<f64>> {
+        let step = equations.solve(damping)?;
         self.moved = step.norm();
-        Some(at - step)
+        Some(at + step)
     }
 
     fn is_settled(&self) -> bool {
@@ -261,6 +263,58 @@ fn the_damped_solver_descends_and_reports_why_it_stopped() {
     assert_eq!((stopped.stop, stopped.tried), (StopReason::IterationLimit, 2));
     let limit = DampedOptions { max_damping: 1e-2, growth: 100.0, ..options };
     assert_eq!(minimize(&mut Valley::default(), Vector2::new(-1.2, 1.4), &limit).stop, StopReason::DampingLimit);
+}
+
+#[test]
+fn gauss_newton_solves_the_valley_in_two_steps_and_stops_at_singular_equations() {
+    let valley = Valley::default();
+    let (mut at, mut steps) = (valley_start(), 0);
+    let solved = gauss_newton(
+        &mut at,
+        10,
+        |at| Some(valley.linearize(at)),
+        |at, step| {
+            (*at, steps) = (*at + step, steps + 1);
+            step.norm() < 1e-9
+        },
+    );
+    assert!(solved.is_some() && steps == 3 && (at - Vector2::new(1.0, 1.0)).norm() < 1e-12, "{at} after {steps}");
+    let singular = gauss_newton(&mut at, 10, |_| Some(NormalEquations::zeros(Const::<2>)), |_, _| false);
+    assert_eq!((singular, at), (None, at));
+}
+
+#[test]
+fn two_levels_of_unknowns_have_the_solution_and_the_covariance_of_the_dense_equations() {
+    let sizes = [3, 2];
+    let (common, all) = (2, 7);
+    let mut random = SplitMix64::new(5);
+    let mut matrix = |rows: usize, columns: usize| DMatrix::from_fn(rows, columns, |_, _| uniform(&mut random, 1.0));
+    let mut equations = TwoLevelEquations::zeros(&sizes, common);
+    let mut dense = NormalEquations::zeros(Dyn(all));
+    for (group, first) in [(0, 2), (0, 2), (1, 5), (1, 5)] {
+        let (of_common, own) = (matrix(4, common), matrix(4, sizes[group]));
+        let residual = matrix(4, 1).column(0).into_owned();
+        equations.add(group, &residual, &[(0, &own)], &[(0, &of_common)], 0.7);
+        let mut jacobian = DMatrix::zeros(4, all);
+        jacobian.columns_mut(0, common).copy_from(&of_common);
+        jacobian.columns_mut(first, sizes[group]).copy_from(&own);
+        dense.add(&residual, &jacobian, 0.7);
+    }
+    for damping in [0.0, 0.3] {
+        let (step, expected) = (equations.solve(damping).unwrap(), dense.solve(damping).unwrap());
+        let found = step.common.iter().chain(step.groups.iter().flatten());
+        assert!(found.zip(&expected).all(|(found, expected)| (found - expected).abs() < 1e-12), "{step:?} {expected}");
+    }
+    let covariance = dense.hessian.try_inverse().unwrap();
+    let posterior = equations.posterior(&DVector::repeat(common, f64::INFINITY)).unwrap();
+    let expected = covariance.view((0, 0), (common, common)).into_owned();
+    assert!(
+        (&posterior.common - &expected).amax() < 1e-12 && posterior.common == equations.common_covariance().unwrap()
+    );
+    for (unknown, variance) in posterior.groups.iter().flatten().enumerate() {
+        let expected = covariance[(common + unknown, common + unknown)];
+        assert!((variance - expected).abs() < 1e-12, "{variance}, {expected}");
+    }
 }
 
 #[test]

@@ -7,6 +7,7 @@ use nalgebra::{Vector1, Vector3};
 use super::motion_samples::{MotionSample, PrescribedMotion};
 use super::spline::Spline;
 use super::trajectory::Trajectory;
+use crate::geometry::median;
 
 /// Motion of joints and vehicle as one uniform quintic B-spline per channel: the joints, then forward, left, up in
 /// metres, then the heading.
@@ -47,9 +48,8 @@ impl MotionSplines {
     /// Interpolates samples that pass [`PrescribedMotion::check`]: at its knots, 0.1 s or the samples' median distance
     /// apart, the motion equals the samples, interpolated linearly between them.
     pub fn through(motion: &PrescribedMotion) -> Self {
-        let mut gaps_s: Vec<f64> = motion.samples.windows(2).map(|pair| pair[1].time_s - pair[0].time_s).collect();
-        gaps_s.sort_by(f64::total_cmp);
-        let knot_s = gaps_s.get(gaps_s.len() / 2).map_or(MIN_KNOT_S, |gap_s| gap_s.max(MIN_KNOT_S));
+        let gaps_s = motion.samples.windows(2).map(|pair| pair[1].time_s - pair[0].time_s);
+        let knot_s = median(gaps_s).map_or(MIN_KNOT_S, |gap_s| gap_s.max(MIN_KNOT_S));
         Self::with_knots(motion, knot_s)
     }
 

@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::fit::StillsFit;
 use super::loops::EncoderTerm;
-use super::significance::f_survival;
+use crate::geometry::f_survival;
 
 /// Probability that any of the tests is significant without a systematic error.
 const LEVEL: f64 = 0.01;

@@ -1,12 +1,12 @@
 //! Calibration of some sets: chain, noise, and the sets whose readings are wrong.
 
-use super::equations::StillsPosterior;
 use super::loops::{EncoderTerm, StillsLoops, StillsState};
 use super::noise::{EffectSum, StillsNoise};
 use super::observed::ObservedSet;
 use super::wrong_readings::{next_wrong, robust_sigma_rad, wrong_at_first};
 use crate::geometry::RigidTransform;
 use crate::gimbal::Chain;
+use crate::optimization::TwoLevelPosterior;
 use crate::optimization::damped::{DampedOptions, minimize};
 
 const OPTIONS: DampedOptions = DampedOptions {
@@ -42,7 +42,7 @@ pub enum AngleModel {
 pub(super) struct StillsFit<'a> {
     pub(super) loops: StillsLoops<'a>,
     pub(super) state: StillsState,
-    pub(super) posterior: StillsPosterior,
+    pub(super) posterior: TwoLevelPosterior,
     /// True for each set whose readings are wrong.
     pub(super) wrong: Vec<bool>,
 }
@@ -133,7 +133,7 @@ impl<'a> StillsFit<'a> {
             .enumerate()
             .find_map(|(station, places)| places.iter().position(|it| *it == place).map(|index| (station, index)));
         let row = |index: usize| index * (self.state.chain.joint_count() + 3) + joint;
-        found.map_or(f64::NAN, |(station, index)| self.posterior.stations[station][row(index)].max(0.0).sqrt())
+        found.map_or(f64::NAN, |(station, index)| self.posterior.groups[station][row(index)].max(0.0).sqrt())
     }
 }
 
@@ -158,7 +158,7 @@ fn largest_ratio(loops: &StillsLoops<'_>, state: &StillsState, place: usize) -> 
 }
 
 /// Adjusts and estimates the noise in turn until both have converged; `None` if the equations are singular.
-fn settle(loops: &mut StillsLoops<'_>, state: &mut StillsState, wrong: &[bool]) -> Option<StillsPosterior> {
+fn settle(loops: &mut StillsLoops<'_>, state: &mut StillsState, wrong: &[bool]) -> Option<TwoLevelPosterior> {
     for _ in 0..NOISE_ROUNDS {
         *state = minimize(loops, state.clone(), &OPTIONS).estimate;
         let posterior = loops.posterior(state)?;
@@ -177,7 +177,7 @@ fn settle(loops: &mut StillsLoops<'_>, state: &mut StillsState, wrong: &[bool]) 
 fn estimated_noise(
     loops: &StillsLoops<'_>,
     state: &StillsState,
-    posterior: &StillsPosterior,
+    posterior: &TwoLevelPosterior,
     wrong: &[bool],
 ) -> StillsNoise {
     let joints = state.chain.joint_count();
@@ -185,7 +185,7 @@ fn estimated_noise(
     let mut encoders = vec![EffectSum::default(); joints];
     let [mut rotation, mut position, mut gimbal] = [EffectSum::default(); 3];
     for (station, places) in loops.stations.iter().enumerate() {
-        let variances = &posterior.stations[station];
+        let variances = &posterior.groups[station];
         for (index, &place) in places.iter().enumerate() {
             let first = index * (joints + 3);
             if loops.reading_weights[place] > 0.0 && !wrong[place] {

@@ -3,14 +3,14 @@
 //! Cost: `Σ |r + D·u|² + Σ w (q − reading − F·β)²/σ_q² + Σ u²/σ_u²`, over sets and stations. `u` are the errors of the map,
 //! `β` the coefficients of tested encoder errors, `w` the weight of a set's readings.
 
-use nalgebra::{DMatrix, DVector, Vector3, Vector6};
+use nalgebra::{DVector, Vector3, Vector6};
 
-use super::equations::{StillsEquations, StillsPosterior};
 use super::noise::{FREE_ANGLE_SIGMA_RAD, StillsNoise};
 use super::observed::ObservedSet;
 use crate::geometry::RigidTransform;
 use crate::gimbal::Chain;
-use crate::optimization::damped::DampedProblem;
+use crate::optimization::damped::LeastSquares;
+use crate::optimization::{TwoLevelEquations, TwoLevelPosterior, TwoLevelStep};
 
 /// Largest σ of a column of the chain or of a further camera, in units of its scale (10° and 3 cm).
 const WEAKEST: f64 = 100.0;
@@ -138,88 +138,51 @@ impl<'a> StillsLoops<'a> {
         DVector::from_vec(values)
     }
 
-    pub(super) fn posterior(&self, state: &StillsState) -> Option<StillsPosterior> {
-        self.linearized(state).posterior(&self.weakest(state))
-    }
-
-    fn linearized(&self, state: &StillsState) -> StillsEquations {
-        let common = self.common_sizes(state).iter().sum();
-        let sizes: Vec<usize> = (0..self.stations.len()).map(|station| self.own_size(state, station)).collect();
-        let mut equations = StillsEquations::zeros(&sizes, common);
-        for station in 0..self.stations.len() {
-            for index in 0..self.stations[station].len() {
-                self.add_set(&mut equations, state, station, index);
-            }
-            let first = sizes[station] - 6 * (state.further.len() + 1);
-            for (camera, errors) in state.rigid_map[station].iter().enumerate() {
-                for (coordinate, error) in errors.iter().enumerate() {
-                    let information = self.rigid_map_sigma(coordinate).powi(-2);
-                    let row = first + 6 * camera + coordinate;
-                    let own = &mut equations.stations[station];
-                    own.own[(row, row)] += information;
-                    own.gradient[row] += information * error;
-                }
-            }
-        }
-        equations
+    pub(super) fn posterior(&self, state: &StillsState) -> Option<TwoLevelPosterior> {
+        self.linearize(state).posterior(&self.weakest(state))
     }
 
     /// Adds rows and priors of one set, the `index`-th of its station.
-    fn add_set(&self, equations: &mut StillsEquations, state: &StillsState, station: usize, index: usize) {
+    fn add_set(&self, equations: &mut TwoLevelEquations, state: &StillsState, station: usize, index: usize) {
         let place = self.stations[station][index];
         let set = self.sets[place];
         let joints = state.chain.joint_count();
         let [chain, further, _] = self.common_sizes(state);
         let rows = set.rows(&state.chain, &state.further, &state.joints_rad[place]);
         let residual = self.with_map(state, station, place, rows.residual.clone());
-        let size = self.own_size(state, station);
         let first = index * (joints + 3);
-        let rigid = size - 6 * (state.further.len() + 1);
-        let mut own = DMatrix::zeros(residual.len(), size);
-        own.columns_mut(first, joints).copy_from(&rows.by_joints);
-        own.columns_mut(first + joints, 3).copy_from(&set.by_gimbal_map);
-        for ((camera, _), by_map) in set.rigid.iter().zip(&set.by_rigid_map) {
-            own.columns_mut(rigid + 6 * camera, 6).copy_from(by_map);
-        }
-        let mut common = DMatrix::zeros(residual.len(), equations.common.nrows());
-        common.columns_mut(0, chain).copy_from(&rows.by_chain);
-        common.columns_mut(chain, further).copy_from(&rows.by_further);
-        equations.common += common.tr_mul(&common);
-        equations.gradient += common.tr_mul(&residual);
-        let block = &mut equations.stations[station];
-        block.own += own.tr_mul(&own);
-        block.coupling += own.tr_mul(&common);
-        block.gradient += own.tr_mul(&residual);
+        let rigid = self.own_size(state, station) - 6 * (state.further.len() + 1);
+        let mut own = vec![(first, &rows.by_joints), (first + joints, &set.by_gimbal_map)];
+        own.extend(set.rigid.iter().zip(&set.by_rigid_map).map(|((camera, _), by_map)| (rigid + 6 * camera, by_map)));
+        equations.add(station, &residual, &own, &[(0, &rows.by_chain), (chain, &rows.by_further)], 1.0);
+        let group = &mut equations.groups[station];
         for coordinate in 0..3 {
-            let row = first + joints + coordinate;
-            let information = self.noise.set_position_m.powi(-2);
-            block.own[(row, row)] += information;
-            block.gradient[row] += information * state.gimbal_map_m[place][coordinate];
+            let error_m = state.gimbal_map_m[place][coordinate];
+            group.own.add_diagonal(first + joints + coordinate, error_m, self.noise.set_position_m.powi(-2));
         }
         for joint in 0..joints {
             let row = first + joint;
             let information = self.reading_information(place, joint);
             let correction = self.correction_rad(state, place, joint);
-            block.own[(row, row)] += information;
-            block.gradient[row] += information * correction;
+            group.own.add_diagonal(row, correction, information);
             let terms = || {
                 let terms = self.terms.iter().enumerate().filter(|(_, term)| term.joint == joint);
                 terms.map(|(index, term)| (chain + further + index, term.values[place]))
             };
             for (column, value) in terms() {
-                block.coupling[(row, column)] -= information * value;
-                equations.gradient[column] -= information * value * correction;
+                group.coupling[(row, column)] -= information * value;
+                equations.common.gradient[column] -= information * value * correction;
                 for (other, other_value) in terms() {
-                    equations.common[(column, other)] += information * value * other_value;
+                    equations.common.hessian[(column, other)] += information * value * other_value;
                 }
             }
         }
     }
 }
 
-impl DampedProblem for StillsLoops<'_> {
+impl LeastSquares for StillsLoops<'_> {
     type Estimate = StillsState;
-    type Equations = StillsEquations;
+    type Equations = TwoLevelEquations;
 
     fn cost(&self, state: &StillsState) -> f64 {
         let mut cost = 0.0;
@@ -240,12 +203,27 @@ impl DampedProblem for StillsLoops<'_> {
         cost
     }
 
-    fn linearize(&self, state: &StillsState) -> StillsEquations {
-        self.linearized(state)
+    fn linearize(&self, state: &StillsState) -> TwoLevelEquations {
+        let common = self.common_sizes(state).iter().sum();
+        let sizes: Vec<usize> = (0..self.stations.len()).map(|station| self.own_size(state, station)).collect();
+        let mut equations = TwoLevelEquations::zeros(&sizes, common);
+        for station in 0..self.stations.len() {
+            for index in 0..self.stations[station].len() {
+                self.add_set(&mut equations, state, station, index);
+            }
+            let first = sizes[station] - 6 * (state.further.len() + 1);
+            for (camera, errors) in state.rigid_map[station].iter().enumerate() {
+                for (coordinate, error) in errors.iter().enumerate() {
+                    let row = first + 6 * camera + coordinate;
+                    let information = self.rigid_map_sigma(coordinate).powi(-2);
+                    equations.groups[station].own.add_diagonal(row, *error, information);
+                }
+            }
+        }
+        equations
     }
 
-    fn step(&mut self, state: &StillsState, equations: &StillsEquations, damping: f64) -> Option<StillsState> {
-        let step = equations.solve(damping)?;
+    fn plus(&self, state: &StillsState, step: &TwoLevelStep) -> StillsState {
         let mut moved = state.clone();
         let [chain, further, _] = self.common_sizes(state);
         moved.chain = state.chain.plus_slice(&step.common.as_slice()[..chain]);
@@ -256,7 +234,7 @@ impl DampedProblem for StillsLoops<'_> {
             *effect += delta;
         }
         let joints = state.chain.joint_count();
-        for (station, delta) in step.stations.iter().enumerate() {
+        for (station, delta) in step.groups.iter().enumerate() {
             for (index, &place) in self.stations[station].iter().enumerate() {
                 let first = index * (joints + 3);
                 for joint in 0..joints {
@@ -269,6 +247,6 @@ impl DampedProblem for StillsLoops<'_> {
                 *errors += delta.fixed_rows::<6>(rigid + 6 * camera);
             }
         }
-        Some(moved)
+        moved
     }
 }

@@ -12,8 +12,6 @@
 
 mod calibrate;
 mod encoders;
-mod equations;
-mod error;
 mod fit;
 mod hold_out;
 mod loops;
@@ -26,16 +24,14 @@ mod point_residual;
 mod pose_start;
 mod ranks;
 mod scores;
-mod significance;
 #[cfg(test)]
 mod tests;
 mod view_pose;
 mod warnings;
 mod wrong_readings;
 
-pub use calibrate::{StillsOptions, calibrate_stills, judge_stills};
+pub use calibrate::{StillsError, StillsOptions, calibrate_stills, judge_stills};
 pub use encoders::{EncoderErrorKind, EncoderTest};
-pub use error::StillsError;
 pub use fit::AngleModel;
 pub use noise::StillsNoise;
 pub use outcome::{

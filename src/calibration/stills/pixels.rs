@@ -5,15 +5,15 @@
 //! *As read*: at the readings of the joints. *Estimated*: at joint angles estimated from half of the points of the rigid
 //! cameras, evaluated on the other half; both halves in turn.
 
-use nalgebra::{DMatrix, DVector, Matrix6xX};
+use nalgebra::{DVector, Dyn, Matrix6xX};
 
 use super::observed::{ObservedSet, from_first};
 use super::point_residual::{by_pose, residual, residual_lengths};
 use crate::camera::CameraModel;
 use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::Chain;
-use crate::optimization::RobustLoss;
-use crate::optimization::damped::{DampedOptions, DampedProblem, minimize};
+use crate::optimization::damped::{DampedOptions, LeastSquares, minimize};
+use crate::optimization::{NormalEquations, RobustLoss};
 use crate::sensors::{MapPoint, StillCamera};
 
 const OPTIONS: DampedOptions = DampedOptions {
@@ -109,9 +109,9 @@ struct PoseAngles<'a> {
     further: &'a [RigidTransform],
 }
 
-impl DampedProblem for PoseAngles<'_> {
+impl LeastSquares for PoseAngles<'_> {
     type Estimate = DVector<f64>;
-    type Equations = (DMatrix<f64>, DVector<f64>);
+    type Equations = NormalEquations<Dyn>;
 
     fn cost(&self, angles_rad: &DVector<f64>) -> f64 {
         self.set.residual(self.chain, self.further, angles_rad.as_slice()).norm_squared()
@@ -119,11 +119,13 @@ impl DampedProblem for PoseAngles<'_> {
 
     fn linearize(&self, angles_rad: &DVector<f64>) -> Self::Equations {
         let rows = self.set.rows(self.chain, self.further, angles_rad.as_slice());
-        (rows.by_joints.tr_mul(&rows.by_joints), rows.by_joints.tr_mul(&rows.residual))
+        let mut equations = NormalEquations::zeros(Dyn(angles_rad.len()));
+        equations.add(&rows.residual, &rows.by_joints, 1.0);
+        equations
     }
 
-    fn step(&mut self, angles_rad: &DVector<f64>, equations: &Self::Equations, damping: f64) -> Option<DVector<f64>> {
-        damped_step(angles_rad, equations, damping)
+    fn plus(&self, angles_rad: &DVector<f64>, step: &DVector<f64>) -> DVector<f64> {
+        angles_rad + step
     }
 }
 
@@ -155,9 +157,9 @@ impl AngleProblem<'_> {
     }
 }
 
-impl DampedProblem for AngleProblem<'_> {
+impl LeastSquares for AngleProblem<'_> {
     type Estimate = DVector<f64>;
-    type Equations = (DMatrix<f64>, DVector<f64>);
+    type Equations = NormalEquations<Dyn>;
 
     fn cost(&self, angles_rad: &DVector<f64>) -> f64 {
         let of_view = |(camera, model, points): &(usize, &CameraModel, Vec<MapPoint>)| -> f64 {
@@ -168,8 +170,7 @@ impl DampedProblem for AngleProblem<'_> {
     }
 
     fn linearize(&self, angles_rad: &DVector<f64>) -> Self::Equations {
-        let joints = angles_rad.len();
-        let (mut hessian, mut gradient) = (DMatrix::zeros(joints, joints), DVector::zeros(joints));
+        let mut equations = NormalEquations::zeros(Dyn(angles_rad.len()));
         for (camera, model, points) in &self.views {
             let (pose, by_angles) = self.pose_with_jacobian(*camera, angles_rad);
             let rotation = pose.rotation_matrix();
@@ -177,26 +178,13 @@ impl DampedProblem for AngleProblem<'_> {
                 let in_camera = pose.transform(&point.point_in_world_m);
                 let Some((uv_px, by_point)) = model.project_with_jacobian(&in_camera) else { continue };
                 let rows = by_pose(&by_point, &rotation, point) * &by_angles;
-                hessian += rows.tr_mul(&rows);
-                gradient += rows.tr_mul(&(uv_px - point.uv_px));
+                equations.add(&(uv_px - point.uv_px), &rows, 1.0);
             }
         }
-        (hessian, gradient)
+        equations
     }
 
-    fn step(&mut self, angles_rad: &DVector<f64>, equations: &Self::Equations, damping: f64) -> Option<DVector<f64>> {
-        damped_step(angles_rad, equations, damping)
+    fn plus(&self, angles_rad: &DVector<f64>, step: &DVector<f64>) -> DVector<f64> {
+        angles_rad + step
     }
-}
-
-fn damped_step(
-    angles_rad: &DVector<f64>,
-    (hessian, gradient): &(DMatrix<f64>, DVector<f64>),
-    damping: f64,
-) -> Option<DVector<f64>> {
-    let mut hessian = hessian.clone();
-    for index in 0..gradient.len() {
-        hessian[(index, index)] *= 1.0 + damping;
-    }
-    Some(angles_rad - hessian.cholesky()?.solve(gradient))
 }

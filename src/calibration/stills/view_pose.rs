@@ -2,14 +2,14 @@
 //!
 //! The pose minimizes the reprojection residuals `r_i = π(R·X_i + t) − z_i` in least squares over the points that fit.
 
-use nalgebra::{Matrix6, Vector6};
+use nalgebra::{Const, Matrix6, Vector6};
 
 use super::point_residual::{by_pose, median_px, residual, residual_lengths};
 use super::pose_start::pose_by_samples;
 use crate::camera::CameraModel;
 use crate::geometry::{MEDIAN_PLANAR_LENGTH, RigidTransform};
-use crate::optimization::RobustLoss;
-use crate::optimization::damped::{DampedOptions, DampedProblem, minimize};
+use crate::optimization::damped::{DampedOptions, LeastSquares, minimize};
+use crate::optimization::{NormalEquations, RobustLoss};
 use crate::sensors::{MapPoint, StillCamera, StillView};
 
 /// A point is left out if its residual exceeds this multiple of the median length: 8.5 standard deviations.
@@ -68,13 +68,13 @@ pub(super) fn view_pose(camera: &StillCamera, view: &StillView) -> Option<ViewPo
     let loss = RobustLoss::None;
     let mut problem = PoseProblem { model: &camera.model, points: &points, sigma_px: 1.0, loss };
     let camera_from_world = minimize(&mut problem, robust, &OPTIONS).estimate;
-    let (hessian, _) = problem.linearize(&camera_from_world);
+    let information = problem.linearize(&camera_from_world).hessian;
     let lengths = residual_lengths(&camera.model, &camera_from_world, &points)?;
     let squares: f64 = lengths.iter().map(|length| length * length).sum();
     let sigma_px = (squares / (2 * points.len() - 6) as f64).sqrt();
     Some(ViewPose {
         camera_from_world,
-        covariance: hessian.cholesky()?.inverse() * sigma_px.max(1e-6).powi(2),
+        covariance: information.cholesky()?.inverse() * sigma_px.max(1e-6).powi(2),
         mean_px: lengths.iter().sum::<f64>() / lengths.len() as f64,
         left_out: view.points.len() - points.len(),
         points,
@@ -101,16 +101,16 @@ struct PoseProblem<'a> {
     loss: RobustLoss,
 }
 
-impl DampedProblem for PoseProblem<'_> {
+impl LeastSquares for PoseProblem<'_> {
     type Estimate = RigidTransform;
-    type Equations = (Matrix6<f64>, Vector6<f64>);
+    type Equations = NormalEquations<Const<6>>;
 
     fn cost(&self, pose: &RigidTransform) -> f64 {
         self.points.iter().map(|point| self.loss.cost_of(residual(self.model, pose, point), self.sigma_px)).sum()
     }
 
     fn linearize(&self, pose: &RigidTransform) -> Self::Equations {
-        let (mut hessian, mut gradient) = (Matrix6::zeros(), Vector6::zeros());
+        let mut equations = NormalEquations::zeros(Const);
         let rotation = pose.rotation_matrix();
         for point in self.points {
             let in_camera = pose.transform(&point.point_in_world_m);
@@ -118,17 +118,12 @@ impl DampedProblem for PoseProblem<'_> {
             let residual = (uv_px - point.uv_px) / self.sigma_px;
             let weight = self.loss.cost_and_weight(residual.norm_squared()).1;
             let rows = by_pose(&by_point, &rotation, point) / self.sigma_px;
-            hessian += rows.tr_mul(&rows) * weight;
-            gradient += rows.tr_mul(&residual) * weight;
+            equations.add(&residual, &rows, weight);
         }
-        (hessian, gradient)
+        equations
     }
 
-    fn step(&mut self, pose: &RigidTransform, equations: &Self::Equations, damping: f64) -> Option<RigidTransform> {
-        let (mut hessian, gradient) = *equations;
-        for index in 0..6 {
-            hessian[(index, index)] *= 1.0 + damping;
-        }
-        Some(pose.plus(&-hessian.cholesky()?.solve(&gradient)))
+    fn plus(&self, pose: &RigidTransform, step: &Vector6<f64>) -> RigidTransform {
+        pose.plus(step)
     }
 }

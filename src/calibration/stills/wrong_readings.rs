@@ -1,7 +1,6 @@
 //! Readings that contradict the images: the next one by a test against the spread of all others.
 
-use super::significance::f_survival;
-use crate::geometry::{SIGMA_PER_MEDIAN, median};
+use crate::geometry::{SIGMA_PER_MEDIAN, f_survival, median};
 
 /// Probability that any reading of a set of stills is called wrong although all are normally distributed.
 const LEVEL: f64 = 0.01;

@@ -102,8 +102,8 @@ fn prior() -> ChainPrior {
 fn pose_loop_jacobians_meet_central_differences() {
     let example = example(3, 0.05, (0.0, 0.0), false);
     let term = ChainTerm::new(&example.given, &prior(), auto_parameterization(&example.given));
-    let loops = PoseLoops { segments: &example.segments, prior: &term };
     let noise = LoopNoise { rotation_rad: 0.01, position_m: 0.02, loss: RobustLoss::None };
+    let loops = PoseLoops { noise, ..PoseLoops::new(&example.segments, &term) };
     let state = LoopState {
         chain: term.given.clone(),
         joints_rad: example
@@ -121,14 +121,14 @@ fn pose_loop_jacobians_meet_central_differences() {
             })
             .collect(),
     };
-    let rows = loops.rows(&state, 2, 4, &noise);
+    let rows = loops.rows(&state, 2, 4);
     let step = 1e-6;
     let check = |name: &str, column: nalgebra::Matrix6xX<f64>, move_by: &dyn Fn(&mut LoopState, usize, f64)| {
         for k in 0..column.ncols() {
             let at = |sign: f64| -> Vector6<f64> {
                 let mut moved = state.clone();
                 move_by(&mut moved, k, sign * step);
-                loops.rows(&moved, 2, 4, &noise).residual
+                loops.rows(&moved, 2, 4).residual
             };
             let slope = (at(1.0) - at(-1.0)) / (2.0 * step);
             assert!((slope - column.column(k)).amax() < 1e-4, "{name} {k}");
@@ -151,10 +151,10 @@ fn exact_poses_recover_the_chain_up_to_encoder_noise() {
     for seed in 1..=4 {
         let example = example(seed, 1e-4, (0.0, 0.0), false);
         let term = ChainTerm::new(&example.given, &prior(), auto_parameterization(&example.given));
-        let solution = PoseLoops { segments: &example.segments, prior: &term }.solve().unwrap();
+        let solution = PoseLoops::new(&example.segments, &term).solve().unwrap();
         let before = ChainDistance::over(&example.given, &example.ground_truth, &example.visited).unwrap();
         let after =
-            ChainDistance::over(&solution.chain.to_classical(), &example.ground_truth, &example.visited).unwrap();
+            ChainDistance::over(&solution.state.chain.to_classical(), &example.ground_truth, &example.visited).unwrap();
         assert!(before.translation_mean_m > 0.01, "seed {seed}: {before:?}");
         assert!(after.translation_mean_m < 5e-4 && after.rotation_mean_rad < 1e-3, "seed {seed}: {after:?}");
     }
@@ -166,9 +166,9 @@ fn noisy_encoders_leave_the_chain_within_its_sigmas() {
     for seed in 11..=16 {
         let example = example(seed, 0.1, (1e-3, 5e-3), false);
         let term = ChainTerm::new(&example.given, &prior(), auto_parameterization(&example.given));
-        let solution = PoseLoops { segments: &example.segments, prior: &term }.solve().unwrap();
-        let ground_truth = Chain::from_classical(&example.ground_truth, solution.chain.parameterization());
-        let error = solution.chain.minus(&ground_truth).map(wrap_angle);
+        let solution = PoseLoops::new(&example.segments, &term).solve().unwrap();
+        let ground_truth = Chain::from_classical(&example.ground_truth, solution.state.chain.parameterization());
+        let error = solution.state.chain.minus(&ground_truth).map(wrap_angle);
         let information = solution.covariance.clone().try_inverse().unwrap();
         square += (error.transpose() * information * &error)[0];
         count += error.len() as f64;
@@ -185,12 +185,13 @@ fn stationary_joints_leave_unobservable_directions_at_the_prior() {
     let moving = example(5, 0.01, (0.0, 0.0), false);
     let example = example(5, 0.01, (0.0, 0.0), true);
     let term = ChainTerm::new(&example.given, &prior(), auto_parameterization(&example.given));
-    let solution = PoseLoops { segments: &example.segments, prior: &term }.solve().unwrap();
-    let moved = PoseLoops { segments: &moving.segments, prior: &term }.solve().unwrap();
+    let solution = PoseLoops::new(&example.segments, &term).solve().unwrap();
+    let moved = PoseLoops::new(&moving.segments, &term).solve().unwrap();
     let total = |covariance: &nalgebra::DMatrix<f64>| {
         (0..covariance.nrows()).map(|k| covariance[(k, k)] / term.prior_sigmas[k].powi(2)).sum::<f64>()
     };
     assert!(total(&solution.covariance) > 5.0 * total(&moved.covariance));
-    let error = ChainDistance::over(&solution.chain.to_classical(), &example.ground_truth, &example.visited).unwrap();
+    let error =
+        ChainDistance::over(&solution.state.chain.to_classical(), &example.ground_truth, &example.visited).unwrap();
     assert!(error.translation_mean_m < 0.01 && error.rotation_mean_rad < 0.02, "{error:?}");
 }

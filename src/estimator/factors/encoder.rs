@@ -33,6 +33,18 @@ pub(crate) struct EncoderResidual {
     pub(crate) by_clock: f64,
 }
 
+impl EncoderResidual {
+    /// `(θ + θ̇·shift − reading) / σ`, the difference wrapped to [−π, π).
+    pub(crate) fn new(angle_rad: f64, rate_rad_per_s: f64, shift_s: f64, reading_rad: f64, sigma_rad: f64) -> Self {
+        let by_angle = 1.0 / sigma_rad;
+        Self {
+            residual: wrap_angle(angle_rad + rate_rad_per_s * shift_s - reading_rad) / sigma_rad,
+            by_angle,
+            by_clock: by_angle * rate_rad_per_s,
+        }
+    }
+}
+
 impl<'a> EncoderFactor<'a> {
     /// Factor of the frame at `slot`, `None` without joints or readings.
     pub(crate) fn of(point: &Point<'a>, slot: usize) -> Option<Self> {
@@ -60,12 +72,7 @@ impl<'a> EncoderFactor<'a> {
         let readings = self.reading.angles_rad.iter().zip(&self.reading.sigmas_rad);
         let joints = self.angles_rad.iter().zip(&self.rates_rad_per_s);
         joints.zip(readings).map(|((angle, rate), (reading, sigma))| {
-            let by_angle = 1.0 / sigma;
-            EncoderResidual {
-                residual: wrap_angle(angle + rate * self.shift_s - reading) / sigma,
-                by_angle,
-                by_clock: by_angle * rate,
-            }
+            EncoderResidual::new(*angle, *rate, self.shift_s, *reading, *sigma)
         })
     }
 }

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 use super::factor::{Factor, JacobianBlock, Point, Products, Sink, WhitenedRows};
 use super::kind::FactorLabel;
 use crate::estimator::state::layout::{Layout, POSE};
-use crate::optimization::dense;
+use crate::geometry::triangular_factor::echelon;
 
 /// Unknown that a column of the prior belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -61,7 +61,7 @@ impl Prior {
         let ordered: Vec<usize> = eliminated.iter().chain(&kept).copied().chain([total]).collect();
         // Drops residuals that no unknown can change: their cost would accumulate over a flight until no step
         // seemed to lower the cost.
-        let echelon = dense::echelon(&rows.select_columns(&ordered), eliminated.len());
+        let echelon = echelon(&rows.select_columns(&ordered), eliminated.len());
         let (first, height) = (echelon.leading_rank, echelon.rows.nrows() - echelon.leading_rank);
         if height == 0 {
             return None;

@@ -11,7 +11,7 @@ use crate::estimator::factors::reprojection::ReducedVisualEquations;
 use crate::estimator::state::estimate::Estimate;
 use crate::estimator::state::layout::Layout;
 use crate::optimization::damped::{DampedOptions, DampedProblem, Iteration, minimize};
-use crate::optimization::{Cholesky, DIAGONAL_FLOOR};
+use crate::optimization::{Cholesky, DIAGONAL_FLOOR, fix};
 
 /// One iteration of the solver.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -177,7 +177,9 @@ impl DampedWindow<'_> {
     /// Computes [`Self::hessian`] and returns the gradient, landmarks eliminated; fixed parameters do not move.
     fn reduce(&mut self, equations: &NormalEquations, eliminated: &[ReducedVisualEquations]) -> DVector<f64> {
         let mut gradient = equations.reduce_into(&mut self.hessian, &self.problem.layout, eliminated);
-        fix(&self.fixed, &mut self.hessian, &mut gradient);
+        for column in &self.fixed {
+            fix(&mut self.hessian, &mut gradient, *column);
+        }
         self.hessian_is_information = false;
         gradient
     }
@@ -228,15 +230,5 @@ impl DampedProblem for DampedWindow<'_> {
         self.last = Some(Rc::clone(equations));
         self.hessian_is_information = damping <= DAMPING;
         Some(self.evaluated(self.problem.stepped(&evaluated.estimate, &step, &landmarks)))
-    }
-}
-
-/// Removes unknowns from the normal equations, so that their steps are zero.
-fn fix(fixed: &[usize], hessian: &mut DMatrix<f64>, gradient: &mut DVector<f64>) {
-    for column in fixed {
-        hessian.row_mut(*column).fill(0.0);
-        hessian.column_mut(*column).fill(0.0);
-        hessian[(*column, *column)] = 1.0;
-        gradient[*column] = 0.0;
     }
 }

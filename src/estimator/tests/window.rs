@@ -13,9 +13,9 @@ use crate::estimator::state::calibrations::MAIN;
 use crate::estimator::state::estimate::Estimate;
 use crate::estimator::window::covariances;
 use crate::estimator::window::drop_or_marginalize_frame;
+use crate::geometry::triangular_factor;
 use crate::gimbal::Parameterization;
-use crate::optimization::RobustLoss;
-use crate::optimization::{Cholesky, dense};
+use crate::optimization::{Cholesky, RobustLoss};
 
 fn quadratic() -> EstimatorOptions {
     EstimatorOptions { loss: VisualLoss::Fixed(RobustLoss::None), ..EstimatorOptions::default() }
@@ -151,7 +151,7 @@ fn marginalizing_the_oldest_agrees_with_the_full_batch() {
         let kept: Vec<usize> = (layout.frame(1).start..=layout.total()).collect();
         let zero = DVector::zeros(later.total());
         let rows = stack(&[rest.select_columns(&kept), prior.rows(&later, &zero)], 0..=later.total());
-        let upper = dense::triangularize(&rows);
+        let upper = triangular_factor::triangularize(&rows);
         let count = later.total();
         let solution =
             upper.view((0, 0), (count, count)).solve_upper_triangular(&-upper.view((0, count), (count, 1))).unwrap();
@@ -204,7 +204,7 @@ fn an_echelon_gives_dependent_columns_no_row() {
     let columns =
         [free.column(0).into(), one, free.column(1).into(), three, free.column(2).into(), free.column(3).into()];
     let matrix = DMatrix::from_columns(&columns);
-    let echelon = dense::echelon(&matrix, 2);
+    let echelon = triangular_factor::echelon(&matrix, 2);
     assert_eq!((echelon.leading_rank, echelon.rows.nrows()), (1, 3));
     let jacobian = echelon.rows.columns(0, 5);
     let expected = matrix.columns(0, 5).tr_mul(&matrix);

@@ -1,7 +1,7 @@
 //! Correlation of angular speeds over all offsets of the search.
 
 use super::series::{DISTINCT_S, MIN_ROTATIONS, PairRotation, RotationReference};
-use crate::geometry::{ns_from_seconds, seconds_from_ns};
+use crate::geometry::{self, ns_from_seconds, seconds_from_ns};
 
 /// Step of the search and of the sampled speeds, in seconds.
 const STEP_S: f64 = 0.01;
@@ -83,27 +83,10 @@ pub(super) fn correlation(
             let other = *speeds.get(usize::try_from(base + lag + *place as i64).ok()?)?;
             other.is_finite().then_some((speed.min(fastest), other))
         });
-        let (correlation, count) = coefficient(pairs, needed)?;
+        let (correlation, count) = geometry::correlation(pairs).filter(|(_, count)| *count >= needed.max(2))?;
         Some(Correlation { offset_s: lag as f64 * STEP_S + offset_of_base_s, correlation, count })
     };
     (guess - steps..=guess + steps).filter_map(at).collect()
-}
-
-/// Pearson's correlation coefficient and the number of pairs; `None` with fewer pairs than needed or without variation.
-fn coefficient(pairs: impl Iterator<Item = (f64, f64)>, needed: usize) -> Option<(f64, usize)> {
-    let (mut count, mut sums) = (0, [0.0; 5]);
-    for (a, b) in pairs {
-        count += 1;
-        for (sum, term) in sums.iter_mut().zip([a, b, a * a, b * b, a * b]) {
-            *sum += term;
-        }
-    }
-    if count < needed.max(2) {
-        return None;
-    }
-    let [a, b, aa, bb, ab] = sums.map(|sum| sum / count as f64);
-    let variances = (aa - a * a) * (bb - b * b);
-    (variances > 0.0).then(|| ((ab - a * b) / variances.sqrt(), count))
 }
 
 /// Most significant distinct offsets, the most significant first.

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::metric::Metric;
 use super::study::{Study, columns};
-use crate::geometry::mean_square_quantile;
+use crate::geometry::{mean_square_quantile, median};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ParameterPoint {
@@ -102,8 +102,6 @@ fn summarized(name: &str, unit: &'static str, points: Vec<ParameterPoint>) -> Pa
     let count = points.len().max(1) as f64;
     let mean = |of: &dyn Fn(&ParameterPoint) -> f64| points.iter().map(of).sum::<f64>() / count;
     let within = |limit: f64| mean(&|point| f64::from(u8::from(point.error.abs() <= limit * point.sigma)));
-    let mut sigmas: Vec<f64> = points.iter().map(|point| point.sigma).collect();
-    sigmas.sort_by(f64::total_cmp);
     ParameterErrors {
         name: name.to_owned(),
         unit,
@@ -112,7 +110,7 @@ fn summarized(name: &str, unit: &'static str, points: Vec<ParameterPoint>) -> Pa
         within_1: within(1.0),
         within_3: within(3.0),
         error_rms: mean(&|point| point.error.powi(2)).sqrt(),
-        sigma_median: sigmas.get(sigmas.len() / 2).copied().unwrap_or(f64::NAN),
+        sigma_median: median(points.iter().map(|point| point.sigma)).unwrap_or(f64::NAN),
         points,
     }
 }

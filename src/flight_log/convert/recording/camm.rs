@@ -8,6 +8,7 @@ use super::mp4::Payload;
 use super::recorded::{Recorded, finite};
 use super::scalar::Scalar;
 use crate::flight_log::geodesy::Geodetic;
+use crate::geometry::median;
 
 /// Name of the format in the report.
 const FORMAT: &str = "CAMM";
@@ -28,8 +29,7 @@ pub(super) fn read(packets: &[Payload]) -> Option<Recorded> {
             recorded.leave(record, reason);
         }
     }
-    readouts_s.sort_by(f64::total_cmp);
-    if let Some(readout_s) = readouts_s.get(readouts_s.len() / 2).filter(|readout_s| **readout_s != 0.0) {
+    if let Some(readout_s) = median(readouts_s).filter(|readout_s| *readout_s != 0.0) {
         recorded.notes.push(format!(
             "the camera has a rolling shutter, {:.2} ms from the first to the last row in the median: cam0.readout of the rig",
             readout_s * 1e3

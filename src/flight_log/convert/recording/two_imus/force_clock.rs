@@ -5,7 +5,7 @@ use nalgebra::{SMatrix, SVector, Vector3};
 use super::super::super::ForceAgreement;
 use super::super::recorded::RecordedImu;
 use super::rates;
-use crate::geometry::{ns_from_seconds, seconds_from_ns, so3};
+use crate::geometry::{correlation, ns_from_seconds, seconds_from_ns, so3};
 use crate::sensors::AngularRates;
 
 /// Search range on either side of the first guess, in seconds.
@@ -134,7 +134,7 @@ fn coarse_offset(
             let other = reference.get(usize::try_from(lag + place as i64).ok()?)?;
             Some(((*average)?, (*other)?))
         });
-        let (correlation, count) = correlation(pairs);
+        let (correlation, count) = correlation(pairs)?;
         let significance = correlation.min(1.0 - 1e-9).atanh() * (count as f64).sqrt();
         (count >= needed).then_some((significance, base_s + lag as f64 * COARSE_S, correlation))
     };
@@ -144,21 +144,6 @@ fn coarse_offset(
     let next = others.map(|other| other.2.max(0.0)).fold(0.0, f64::max);
     let distinct = 1.0 - next * next >= MIN_DISTINCTION * (1.0 - best.2 * best.2);
     (best.2 >= MIN_CORRELATION && distinct).then_some((best.1, best.2))
-}
-
-/// Pearson's correlation coefficient, and the number of pairs; 0 without variation.
-fn correlation(pairs: impl Iterator<Item = (f64, f64)>) -> (f64, usize) {
-    let (mut count, mut sums) = (0, [0.0; 5]);
-    for (a, b) in pairs {
-        count += 1;
-        for (sum, term) in sums.iter_mut().zip([a, b, a * a, b * b, a * b]) {
-            *sum += term;
-        }
-    }
-    let [a, b, aa, bb, ab] = sums.map(|sum| sum / f64::from(count).max(1.0));
-    let variances = (aa - a * a) * (bb - b * b);
-    let coefficient = if variances > 0.0 { (ab - a * b) / variances.sqrt() } else { 0.0 };
-    (coefficient, count as usize)
 }
 
 /// Unknowns: offset in the middle, drift, level, scale, position of the camera's IMU in the vehicle (3).
