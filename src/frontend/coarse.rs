@@ -12,6 +12,7 @@ use super::prediction::PredictedRotation;
 use super::pyramid::Pyramid;
 use crate::camera::CameraModel;
 use crate::geometry::so3;
+use crate::optimization::damp;
 use crate::sensors::GrayImage;
 
 /// Pyramid levels beyond those of the tracker: an image of 640 pixels is then 40 pixels wide.
@@ -248,7 +249,7 @@ impl<'a> View<'a> {
             }
             let Some(step) = step else { return best };
             let rotation_vector: Vector3<f64> = step.fixed_rows::<3>(0).into_owned();
-            let rotation = UnitQuaternion::new_normalize((at.rotation * so3::exp(&-rotation_vector)).into_inner());
+            let rotation = so3::plus(&at.rotation, &-rotation_vector);
             at = Fit { rotation, gain: at.gain + step[3], offset: at.offset + step[4], cost };
             if rotation_vector.norm() * self.camera.focal_length_px() < SHORT_STEP_PX * self.scale_px {
                 break;
@@ -295,9 +296,7 @@ impl<'a> View<'a> {
             let mut top = right.fixed_rows_mut::<3>(0);
             top += pull;
         }
-        for index in 0..5 {
-            normal[(index, index)] *= 1.0 + 1e-6;
-        }
+        damp(&mut normal, 1e-6);
         let step = normal.cholesky().map(|factor| factor.solve(&right));
         (cost, step.filter(|step| step.iter().all(|value| value.is_finite())))
     }

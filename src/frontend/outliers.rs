@@ -3,10 +3,11 @@
 //! A predicted rotation is a prior only: a gyroscope has a bias, and a gimbal's chain may have an error of degrees.
 //! The rotation is estimated from the tracks, together with the direction of the translation.
 
-use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
+use nalgebra::{Const, Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
 
 use super::prediction::PredictedRotation;
 use crate::geometry::{median, so3, tangent_basis};
+use crate::optimization::{NormalEquations, gauss_newton};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OutlierOptions {
@@ -155,28 +156,27 @@ const ROTATION_ITERATIONS: usize = 12;
 /// Weights decrease with the fourth power of residual over scale; the scale decreases with the median of the residuals,
 /// down to `floor`.
 pub fn fit_rotation(pairs: &[BearingPair], start: &UnitQuaternion<f64>, floor: f64) -> UnitQuaternion<f64> {
-    let mut rotation = *start;
-    for _ in 0..ROTATION_ITERATIONS {
+    let linearize = |rotation: &UnitQuaternion<f64>| {
         let lengths = pairs.iter().map(|pair| (pair.now - rotation * pair.previous).norm());
-        let Some(median) = median(lengths) else { return rotation };
-        let scale = (2.0 * median).max(floor);
+        let scale = (2.0 * median(lengths)?).max(floor);
         let previous_from_now = rotation.inverse();
-        let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
+        let mut equations = NormalEquations::zeros(Const::<3>);
         for pair in pairs {
             let now_in_previous = previous_from_now * pair.now;
             let ratio = (now_in_previous - pair.previous).norm_squared() / (scale * scale);
             let weight = 1.0 / ((1.0 + ratio) * (1.0 + ratio));
-            normal += weight * (Matrix3::identity() - pair.previous * pair.previous.transpose());
-            right += weight * pair.previous.cross(&now_in_previous);
+            equations.hessian += weight * (Matrix3::identity() - pair.previous * pair.previous.transpose());
+            equations.gradient -= weight * pair.previous.cross(&now_in_previous);
         }
         // A few bearings close together do not constrain the rotation about their mean; it keeps its initial value.
-        normal += Matrix3::identity() * (1e-6 * normal.trace() + f64::MIN_POSITIVE);
-        let Some(step) = normal.cholesky().map(|factor| factor.solve(&right)) else { return rotation };
-        rotation = UnitQuaternion::new_normalize((rotation * so3::exp(&step)).into_inner());
-        if step.norm() < 1e-7 {
-            break;
-        }
-    }
+        equations.hessian += Matrix3::identity() * (1e-6 * equations.hessian.trace() + f64::MIN_POSITIVE);
+        Some(equations)
+    };
+    let mut rotation = *start;
+    gauss_newton(&mut rotation, ROTATION_ITERATIONS, linearize, |rotation, step| {
+        *rotation = so3::plus(rotation, step);
+        step.norm() < 1e-7
+    });
     rotation
 }
 
@@ -450,8 +450,7 @@ pub(super) fn step_towards(
         normal[(k, k)] += MIN_INFORMATION;
     }
     let step = normal.cholesky()?.solve(&right);
-    let rotation_step = so3::exp(&Vector3::new(step[0], step[1], step[2]));
-    let rotation = UnitQuaternion::new_normalize((at.rotation * rotation_step).into_inner());
+    let rotation = so3::plus(&at.rotation, &Vector3::new(step[0], step[1], step[2]));
     let direction = (at.direction + basis * step.fixed_rows::<2>(3)).try_normalize(1e-9)?;
     Some((rotation, direction))
 }

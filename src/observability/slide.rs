@@ -1,6 +1,6 @@
 //! Moves the chain along a direction and predicts the reprojections of a step.
 
-use nalgebra::{DVector, Vector2, Vector3};
+use nalgebra::{DVector, Dyn, Vector2, Vector3};
 
 use super::RankReport;
 use crate::camera::CameraModel;
@@ -8,6 +8,7 @@ use crate::estimator::{FeatureReport, FrameStateReport, StepReport};
 use crate::frontend::FeatureId;
 use crate::geometry::{Dimension, RigidTransform, so3};
 use crate::gimbal::{Chain, ClassicalChain};
+use crate::optimization::{NormalEquations, gauss_newton};
 
 /// Chain moved along a direction, with the predicted effect on camera and images.
 #[derive(Clone, Debug, PartialEq)]
@@ -119,18 +120,21 @@ fn extrinsics(frame: &FrameStateReport, chain: &Chain, like: Option<&RigidTransf
     }
     let mut angles = frame.joint_angles_rad.clone();
     if let Some(like) = like.filter(|_| frame.encoder_angles_rad.is_none() && !angles.is_empty()) {
-        for _ in 0..JOINT_STEPS {
-            let Some(step) = towards(chain, &angles, like) else { break };
-            for (angle, step) in angles.iter_mut().zip(step.iter()) {
-                *angle += step;
-            }
-        }
+        gauss_newton(
+            &mut angles,
+            JOINT_STEPS,
+            |angles| Some(towards(chain, angles, like)),
+            |angles, step| {
+                angles.iter_mut().zip(step.iter()).for_each(|(angle, change)| *angle += change);
+                false
+            },
+        );
     }
     chain.imu_from_camera(&angles)
 }
 
-/// Step of the joint angles that brings `imu_from_camera` closest to `like`; 10° weigh as much as 3 cm.
-fn towards(chain: &Chain, angles_rad: &[f64], like: &RigidTransform) -> Option<DVector<f64>> {
+/// Normal equations of the joint angles that bring `imu_from_camera` closest to `like`; 10° weigh as much as 3 cm.
+fn towards(chain: &Chain, angles_rad: &[f64], like: &RigidTransform) -> NormalEquations<Dyn> {
     let linearization = chain.linearize(angles_rad);
     let mut wanted = like.minus(&linearization.imu_from_camera);
     let mut slopes = linearization.by_joints.clone();
@@ -138,12 +142,13 @@ fn towards(chain: &Chain, angles_rad: &[f64], like: &RigidTransform) -> Option<D
         slopes.fixed_rows_mut::<3>(start).unscale_mut(scale);
         wanted.fixed_rows_mut::<3>(start).unscale_mut(scale);
     }
-    let mut normal = slopes.tr_mul(&slopes);
-    let floor = 1e-9 * normal.trace();
-    for joint in 0..normal.nrows() {
-        normal[(joint, joint)] += floor;
+    let mut equations = NormalEquations::zeros(Dyn(angles_rad.len()));
+    equations.add(&-wanted, &slopes, 1.0);
+    let floor = 1e-9 * equations.hessian.trace();
+    for joint in 0..angles_rad.len() {
+        equations.add_diagonal(joint, 0.0, floor);
     }
-    Some(normal.cholesky()?.solve(&slopes.tr_mul(&wanted)))
+    equations
 }
 
 struct Window<'a> {

@@ -2,12 +2,13 @@
 
 use std::fmt;
 
-use nalgebra::{Cholesky, Matrix3, SMatrix, SVector, SymmetricEigen, Vector3};
+use nalgebra::{Cholesky, Const, Matrix3, SMatrix, SymmetricEigen, Vector3};
 use serde::{Serialize, Serializer};
 use thiserror::Error;
 
 use super::accuracy::{AlignmentSums, ErrorStatistics, TrajectoryAlignment, path_length_m};
-use crate::geometry::{RigidTransform, so3};
+use crate::geometry::{RigidTransform, consecutive_correlation, so3};
+use crate::optimization::NormalEquations;
 use crate::sensors::{LeverArm, PoseTrack, PositionSample};
 
 /// Smallest mean excitation of the lever arm by rotations, in degrees; below it, noise dominates the lever arm.
@@ -146,16 +147,15 @@ fn with_lever_arm(pairs: &[AntennaPair]) -> Result<AntennaAlignment, AntennaErro
     let mut true_from_estimate = aligned(pairs, &lever_arm_m)?;
     let mut lever_information = Matrix3::zeros();
     for _ in 0..MAX_STEPS {
-        let (normal, gradient) = normal_equations(pairs, &true_from_estimate, &lever_arm_m);
+        let equations = normal_equations(pairs, &true_from_estimate, &lever_arm_m);
+        let normal = &equations.hessian;
         let gauge = Cholesky::new(normal.fixed_view::<GAUGE, GAUGE>(0, 0).into_owned()).ok_or(not_determined)?;
         let mixed = normal.fixed_view::<GAUGE, 3>(0, GAUGE).into_owned();
         lever_information = normal.fixed_view::<3, 3>(GAUGE, GAUGE) - mixed.transpose() * gauge.solve(&mixed);
         check_excitation(&lever_information, pairs.len())?;
-        let step = -Cholesky::new(normal).ok_or(not_determined)?.solve(&gradient);
-        let rotation = so3::exp(&Vector3::new(0.0, 0.0, step[0]));
-        true_from_estimate.rotation = rotation * true_from_estimate.rotation;
-        true_from_estimate.translation_m =
-            rotation * true_from_estimate.translation_m + step.fixed_rows::<3>(1).into_owned();
+        let step = equations.step().ok_or(not_determined)?;
+        let yaw = so3::exp(&Vector3::new(0.0, 0.0, step[0]));
+        true_from_estimate = RigidTransform::new(yaw, step.fixed_rows::<3>(1).into_owned()) * true_from_estimate;
         lever_arm_m += step.fixed_rows::<3>(GAUGE);
         if step.amax() < STEP_TOLERANCE {
             break;
@@ -168,14 +168,13 @@ fn with_lever_arm(pairs: &[AntennaPair]) -> Result<AntennaAlignment, AntennaErro
     Ok(AntennaAlignment { true_from_estimate, lever_arm_m, lever_arm_sigma_m })
 }
 
-/// `JᵀJ` and `Jᵀr` of all residuals; the yaw perturbation rotates about the origin of the ground truth's world.
+/// Normal equations of all residuals; the yaw perturbation rotates about the origin of the ground truth's world.
 fn normal_equations(
     pairs: &[AntennaPair],
     true_from_estimate: &RigidTransform,
     lever_arm_m: &Vector3<f64>,
-) -> (SMatrix<f64, COLUMNS, COLUMNS>, SVector<f64, COLUMNS>) {
-    let mut normal = SMatrix::zeros();
-    let mut gradient = SVector::zeros();
+) -> NormalEquations<Const<COLUMNS>> {
+    let mut equations = NormalEquations::zeros(Const);
     for pair in pairs {
         let residual = residual(pair, true_from_estimate, lever_arm_m);
         let mut jacobian = SMatrix::<f64, 3, COLUMNS>::zeros();
@@ -183,10 +182,9 @@ fn normal_equations(
         jacobian.fixed_view_mut::<3, 3>(0, 1).copy_from(&Matrix3::identity());
         let rotation = true_from_estimate.rotation * pair.pose.rotation;
         jacobian.fixed_view_mut::<3, 3>(0, GAUGE).copy_from(&rotation.to_rotation_matrix().into_inner());
-        normal += jacobian.transpose() * jacobian;
-        gradient += jacobian.transpose() * residual;
+        equations.add(&residual, &jacobian, 1.0);
     }
-    (normal, gradient)
+    equations
 }
 
 /// Returns an error if the rotations do not determine the lever arm. The information per pair, after marginalizing the
@@ -209,8 +207,7 @@ fn check_excitation(lever_information: &Matrix3<f64>, pairs: usize) -> Result<()
 fn variance_of(residuals: &[Vector3<f64>]) -> f64 {
     let freedom = (3 * residuals.len()).saturating_sub(COLUMNS).max(1) as f64;
     let squares: f64 = residuals.iter().map(Vector3::norm_squared).sum();
-    let products: f64 = residuals.windows(2).map(|pair| pair[0].dot(&pair[1])).sum();
-    let correlation = if squares > 0.0 { (products / squares).clamp(0.0, MAX_CORRELATION) } else { 0.0 };
+    let correlation = consecutive_correlation(residuals, MAX_CORRELATION);
     squares / freedom * (1.0 + correlation) / (1.0 - correlation)
 }
 

@@ -5,11 +5,12 @@
 //! extrinsics, which a gimbal rotates: only their rotation at the first view is an unknown, averaged over all
 //! views.
 
-use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Const, DMatrix, DVector, Matrix3, UnitQuaternion, Vector3};
 
 use crate::estimator::state::navigation::ImuBias;
 use crate::estimator::state::preintegration::Preintegration;
 use crate::geometry::{RigidTransform, median, so3};
+use crate::optimization::{NormalEquations, gauss_newton};
 
 /// Standard deviation of a visual rotation between two views; added to the noise of the extrinsics.
 const VISUAL_ROTATION_SIGMA_RAD: f64 = 0.002;
@@ -94,15 +95,13 @@ fn gyroscope_rotations(increments: &[Preintegration], bias: &Vector3<f64>) -> Ve
 pub(super) fn align_rotations(input: &AlignmentInput<'_>) -> Option<RotationAlignment> {
     const ROUNDS: usize = 10;
     let sigma = input.extrinsics_rotation_noise_rad.hypot(VISUAL_ROTATION_SIGMA_RAD);
-    let mut bias = input.gyroscope_bias.mean;
-    let mut extrinsics = input.imu_from_camera.first()?.rotation;
-    for _ in 0..ROUNDS {
+    let linearize = |at: &RotationAlignment| {
+        let (extrinsics, bias) = (at.imu_from_first_camera, at.gyroscope_bias);
         let rotations = gyroscope_rotations(input.increments, &bias);
-        let (mut normal, mut rhs) = (Matrix6::<f64>::zeros(), Vector6::zeros());
+        let mut equations = NormalEquations::zeros(Const::<6>);
         let prior = 1.0 / input.gyroscope_bias.sigma.powi(2);
         for axis in 0..3 {
-            normal[(3 + axis, 3 + axis)] += prior;
-            rhs[3 + axis] += (input.gyroscope_bias.mean[axis] - bias[axis]) * prior;
+            equations.add_diagonal(3 + axis, bias[axis] - input.gyroscope_bias.mean[axis], prior);
         }
         for ((start_from_imu, by_bias), (given, camera)) in
             rotations.iter().zip(input.imu_from_camera.iter().zip(input.cameras))
@@ -118,19 +117,20 @@ pub(super) fn align_rotations(input: &AlignmentInput<'_>) -> Option<RotationAlig
             let mut jacobian = nalgebra::Matrix3x6::zeros();
             jacobian.fixed_view_mut::<3, 3>(0, 0).copy_from(&-Matrix3::identity());
             jacobian.fixed_view_mut::<3, 3>(0, 3).copy_from(&by_bias);
-            normal += jacobian.transpose() * jacobian * weight;
-            rhs -= jacobian.transpose() * error * weight;
+            equations.add(&error, &jacobian, weight);
         }
-        let step = normal.cholesky()?.solve(&rhs);
-        extrinsics =
-            UnitQuaternion::new_normalize((extrinsics * so3::exp(&step.fixed_rows::<3>(0).into_owned())).into_inner());
-        bias += step.fixed_rows::<3>(3);
-        if step.norm() < 1e-7 {
-            break;
-        }
-    }
-    (extrinsics.norm().is_finite() && bias.norm().is_finite())
-        .then_some(RotationAlignment { imu_from_first_camera: extrinsics, gyroscope_bias: bias })
+        Some(equations)
+    };
+    let mut alignment = RotationAlignment {
+        imu_from_first_camera: input.imu_from_camera.first()?.rotation,
+        gyroscope_bias: input.gyroscope_bias.mean,
+    };
+    gauss_newton(&mut alignment, ROUNDS, linearize, |at, step| {
+        at.imu_from_first_camera = so3::plus(&at.imu_from_first_camera, &step.fixed_rows::<3>(0).into_owned());
+        at.gyroscope_bias += step.fixed_rows::<3>(3);
+        step.norm() < 1e-7
+    })?;
+    Some(alignment)
 }
 
 /// Columns of the linear system: scale, extrinsics (3), accelerometer bias (3), gravity (3), velocities (3 each).
@@ -197,7 +197,7 @@ fn align_from(
         let solution = solve_with_gravity_norm(&normal, &rhs, input.gravity_m_per_s2)?;
         let cost = square + (solution.transpose() * (&normal * &solution - &rhs * 2.0))[0];
         let rotation_step = solution.fixed_rows::<3>(EXTRINSICS).into_owned();
-        extrinsics = UnitQuaternion::new_normalize((so3::exp(&rotation_step) * extrinsics).into_inner());
+        extrinsics = so3::plus_left(&extrinsics, &rotation_step);
         rotation_change += rotation_step;
         // A negative scale would mirror the scene: continue from a small positive one.
         scale = Some(solution[SCALE].max(1e-6));

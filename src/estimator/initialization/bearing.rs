@@ -1,8 +1,9 @@
 //! Geometry of unit bearings: rotation between two sets, pose from known points.
 
-use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Const, Matrix3, UnitQuaternion, Vector3};
 
 use crate::geometry::{RigidTransform, median, so3, tangent_basis};
+use crate::optimization::{NormalEquations, damp, gauss_newton};
 
 /// Rotation between two sets of bearings, with the remaining parallax.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,25 +26,25 @@ pub fn fit_rotation(
     if pairs.len() < 3 {
         return None;
     }
-    let mut rotation = *camera_j_from_camera_i;
-    for _ in 0..ROUNDS {
-        let scale = median_angle(pairs, &rotation).max(1e-6);
+    let linearize = |rotation: &UnitQuaternion<f64>| {
+        let scale = median_angle(pairs, rotation).max(1e-6);
         let camera_i_from_camera_j = rotation.inverse();
-        let (mut normal, mut rhs) = (Matrix3::zeros(), Vector3::zeros());
+        let mut equations = NormalEquations::zeros(Const::<3>);
         for (bearing_i, bearing_j) in pairs {
             let measured_in_i = camera_i_from_camera_j * bearing_j;
             let error = measured_in_i.cross(bearing_i);
             let weight = 1.0 / (1.0 + (error.norm() / scale).powi(2));
             // A step φ moves `bearing_i` by φ × bearing_i; the component of φ along the bearing has no effect.
-            normal += (Matrix3::identity() - bearing_i * bearing_i.transpose()) * weight;
-            rhs += bearing_i.cross(&measured_in_i) * weight;
+            equations.hessian += (Matrix3::identity() - bearing_i * bearing_i.transpose()) * weight;
+            equations.gradient -= bearing_i.cross(&measured_in_i) * weight;
         }
-        let step = normal.cholesky()?.solve(&rhs);
-        rotation = UnitQuaternion::new_normalize((rotation * so3::exp(&step)).into_inner());
-        if step.norm() < 1e-7 {
-            break;
-        }
-    }
+        Some(equations)
+    };
+    let mut rotation = *camera_j_from_camera_i;
+    gauss_newton(&mut rotation, ROUNDS, linearize, |rotation, step| {
+        *rotation = so3::plus(rotation, step);
+        step.norm() < 1e-7
+    })?;
     Some(BearingRotation { rotation, median_parallax_rad: median_angle(pairs, &rotation) })
 }
 
@@ -90,26 +91,20 @@ pub fn refine_camera_pose(
     let mut pose = *guess;
     for sigmas in TIGHTENING {
         let scale = sigmas * bearing_sigma_rad;
-        for _ in 0..ROUNDS {
-            let (mut normal, mut rhs) = (Matrix6::<f64>::zeros(), Vector6::zeros());
+        let linearize = |pose: &RigidTransform| {
+            let mut equations = NormalEquations::zeros(Const::<6>);
             for (point, bearing) in points {
-                let Some((error, jacobian)) = pose_residual(&pose, point, bearing) else { continue };
+                let Some((error, jacobian)) = pose_residual(pose, point, bearing) else { continue };
                 let weight = 1.0 / (1.0 + error.norm_squared() / (scale * scale));
-                normal += jacobian.transpose() * jacobian * weight;
-                rhs -= jacobian.transpose() * error * weight;
+                equations.add(&error, &jacobian, weight);
             }
-            for index in 0..6 {
-                normal[(index, index)] *= 1.0 + 1e-9;
-            }
-            let step = normal.cholesky()?.solve(&rhs);
-            if !step.iter().all(|value| value.is_finite()) {
-                return None;
-            }
-            pose = pose.plus(&step);
-            if step.norm() < 1e-8 {
-                break;
-            }
-        }
+            damp(&mut equations.hessian, 1e-9);
+            Some(equations)
+        };
+        gauss_newton(&mut pose, ROUNDS, linearize, |pose, step| {
+            *pose = pose.plus(step);
+            step.norm() < 1e-8
+        })?;
     }
     let limit = inlier_sigmas * bearing_sigma_rad;
     let angles: Vec<f64> = points

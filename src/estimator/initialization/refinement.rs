@@ -5,7 +5,7 @@
 //! IMU's side and a translation) and, on a gimbal, an independent rotation per view: `R = common·given·view`. Every
 //! rotation is perturbed on the right.
 
-use nalgebra::{DMatrix, DVector, Matrix3, Matrix3x2, SMatrix, SVector, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{DVector, Dyn, Matrix3, Matrix3x2, SMatrix, SVector, UnitQuaternion, Vector3, Vector6};
 
 use super::alignment::{Alignment, VectorPrior};
 use super::visual_problem::{TrackedLandmark, moved, visual_cost, visual_equations};
@@ -13,8 +13,8 @@ use crate::estimator::factors::imu::{self, MotionJacobians};
 use crate::estimator::state::navigation::{ImuBias, NavigationState};
 use crate::estimator::state::preintegration::Preintegration;
 use crate::geometry::{RigidTransform, so3, tangent_basis};
-use crate::optimization::damped::{DampedOptions, DampedProblem, StopReason, minimize};
-use crate::optimization::{DensePoseEquations, ReducedEquations, ReprojectionEquations};
+use crate::optimization::damped::{DampedEquations as _, DampedOptions, DampedProblem, StopReason, minimize};
+use crate::optimization::{DensePoseEquations, NormalEquations, ReducedEquations, ReprojectionEquations, damp};
 
 /// Smallest standard deviation of a prior on the extrinsics, so that the equations stay solvable.
 const MIN_SIGMA: f64 = 1e-5;
@@ -171,10 +171,9 @@ impl RefinedState {
         landmarks: Vec<TrackedLandmark>,
     ) -> Self {
         let three = |start: usize| -> Vector3<f64> { step.fixed_rows::<3>(start).into_owned() };
-        let normalized = |q: UnitQuaternion<f64>| UnitQuaternion::new_normalize(q.into_inner());
         let mut next = self.clone();
         next.landmarks = landmarks;
-        next.common_rotation = normalized(self.common_rotation * so3::exp(&three(RefinementLayout::COMMON_ROTATION)));
+        next.common_rotation = so3::plus(&self.common_rotation, &three(RefinementLayout::COMMON_ROTATION));
         next.common_shift += three(RefinementLayout::COMMON_SHIFT);
         next.bias.gyroscope_rad_per_s += three(RefinementLayout::GYROSCOPE);
         next.bias.accelerometer_m_per_s2 += three(RefinementLayout::ACCELEROMETER);
@@ -186,7 +185,7 @@ impl RefinedState {
                 next.poses[view] = self.poses[view].plus(&step.fixed_rows::<6>(layout.pose(view)).into_owned());
             }
             if let Some(start) = layout.view_rotation(view) {
-                next.per_view_rotations[view] = normalized(self.per_view_rotations[view] * so3::exp(&three(start)));
+                next.per_view_rotations[view] = so3::plus(&self.per_view_rotations[view], &three(start));
             }
         }
         next
@@ -196,9 +195,8 @@ impl RefinedState {
 /// All factors linearized at a state.
 pub(super) struct RefinementEquations {
     visual: ReprojectionEquations<DensePoseEquations>,
-    /// Normal matrix of the IMU factors and the priors.
-    normal: DMatrix<f64>,
-    gradient: DVector<f64>,
+    /// IMU factors and priors.
+    others: NormalEquations<Dyn>,
 }
 
 /// The refinement as a least-squares problem: constant data, whitening matrices and column layout.
@@ -229,9 +227,7 @@ impl<'a> Refinement<'a> {
             .map(|increment| {
                 let mut covariance: Matrix9 = increment.covariance().fixed_view::<9, 9>(0, 0).into_owned();
                 // Slightly larger diagonal, so that the covariance of a short interval stays positive definite.
-                for index in 0..9 {
-                    covariance[(index, index)] *= 1.0 + 1e-9;
-                }
+                damp(&mut covariance, 1e-9);
                 let lower = covariance.cholesky()?.unpack();
                 lower.solve_lower_triangular(&Matrix9::identity()).filter(|w| w.iter().all(|x| x.is_finite()))
             })
@@ -265,8 +261,8 @@ impl<'a> Refinement<'a> {
     }
 
     pub(super) fn sigmas(&self, state: &RefinedState) -> Option<RefinementSigmas> {
-        let (normal, _, _) = self.reduced(state, &self.linearized(state), 0.0);
-        let factor = normal.cholesky()?;
+        let (reduced, _) = self.reduced(state, &self.linearized(state), 0.0);
+        let factor = reduced.hessian.cholesky()?;
         let layout = &self.layout;
         // Covariances of a few quantities only.
         let columns = layout.columns();
@@ -336,40 +332,30 @@ impl<'a> Refinement<'a> {
     }
 
     pub(super) fn linearized(&self, state: &RefinedState) -> RefinementEquations {
-        let columns = self.layout.columns();
         let cameras = state.cameras(self.input.imu_from_camera);
-        let mut equations = RefinementEquations {
-            visual: visual_equations(&state.landmarks, &cameras, self.input.bearing_sigma_rad),
-            normal: DMatrix::zeros(columns, columns),
-            gradient: DVector::zeros(columns),
-        };
-        let RefinementEquations { normal, gradient, .. } = &mut equations;
+        let mut others = NormalEquations::zeros(Dyn(self.layout.columns()));
         for (view, increment) in self.input.increments.iter().enumerate() {
-            self.add_imu(state, view, increment, normal, gradient);
+            self.add_imu(state, view, increment, &mut others);
         }
-        self.add_priors(state, normal, gradient);
-        equations
+        self.add_priors(state, &mut others);
+        let visual = visual_equations(&state.landmarks, &cameras, self.input.bearing_sigma_rad);
+        RefinementEquations { visual, others }
     }
 
-    /// Normal matrix and gradient after elimination of the landmarks, and the data of the landmarks' steps.
+    /// Equations after elimination of the landmarks, and the data of the landmarks' steps.
     pub(super) fn reduced(
         &self,
         state: &RefinedState,
         equations: &RefinementEquations,
         damping: f64,
-    ) -> (DMatrix<f64>, DVector<f64>, ReducedEquations<DensePoseEquations>) {
-        let (mut normal, mut gradient) = (equations.normal.clone(), equations.gradient.clone());
+    ) -> (NormalEquations<Dyn>, ReducedEquations<DensePoseEquations>) {
+        let mut reduced = equations.others.clone();
         let visual = equations.visual.eliminate(damping);
-        self.add_visual(state, &visual.poses, &mut normal, &mut gradient);
+        self.add_visual(state, &visual.poses, &mut reduced);
         // The first view is the frame of reference: its pose is fixed.
-        let fixed = self.layout.pose(0);
-        for column in fixed..fixed + 6 {
-            normal.row_mut(column).fill(0.0);
-            normal.column_mut(column).fill(0.0);
-            normal[(column, column)] = 1.0;
-            gradient[column] = 0.0;
-        }
-        (normal, gradient, visual)
+        let pose = self.layout.pose(0);
+        (pose..pose + 6).for_each(|column| reduced.fix(column));
+        (reduced, visual)
     }
 
     /// Derivative of a camera pose by the columns it depends on: pairs of a first column and a 6 × 3 block.
@@ -401,18 +387,12 @@ impl<'a> Refinement<'a> {
         blocks
     }
 
-    fn add_visual(
-        &self,
-        state: &RefinedState,
-        visual: &DensePoseEquations,
-        normal: &mut DMatrix<f64>,
-        gradient: &mut DVector<f64>,
-    ) {
+    fn add_visual(&self, state: &RefinedState, visual: &DensePoseEquations, reduced: &mut NormalEquations<Dyn>) {
         let blocks: Vec<_> = (0..self.layout.views).map(|view| self.camera_blocks(state, view)).collect();
         for (view_a, blocks_a) in blocks.iter().enumerate() {
             let slope = &visual.gradient[view_a];
             for (column, block) in blocks_a {
-                let mut target = gradient.fixed_rows_mut::<3>(*column);
+                let mut target = reduced.gradient.fixed_rows_mut::<3>(*column);
                 target += block.tr_mul(slope);
             }
             for (view_b, blocks_b) in blocks.iter().enumerate() {
@@ -420,7 +400,7 @@ impl<'a> Refinement<'a> {
                 for (column_b, block_b) in blocks_b {
                     let product = corner * block_b;
                     for (column_a, block_a) in blocks_a {
-                        let mut target = normal.fixed_view_mut::<3, 3>(*column_a, *column_b);
+                        let mut target = reduced.hessian.fixed_view_mut::<3, 3>(*column_a, *column_b);
                         target += block_a.tr_mul(&product);
                     }
                 }
@@ -443,8 +423,7 @@ impl<'a> Refinement<'a> {
         state: &RefinedState,
         view: usize,
         increment: &Preintegration,
-        normal: &mut DMatrix<f64>,
-        gradient: &mut DVector<f64>,
+        equations: &mut NormalEquations<Dyn>,
     ) {
         let residual = self.imu_residual(state, view, increment);
         let whitening = &self.whitening[view];
@@ -455,46 +434,23 @@ impl<'a> Refinement<'a> {
         jacobians.rotation_by_motion *= so3::right_jacobian(&shift.fixed_rows::<3>(0).into_owned());
         let by_bias = whitening * jacobians.by_parameters(increment.bias_jacobian());
         let [by_from, by_to] = [jacobians.by_from, jacobians.by_to].map(|by_state| whitening * by_state);
-        let (pose_i, pose_j) = (self.layout.pose(view), self.layout.pose(view + 1));
-        let (velocity_i, velocity_j) = (self.layout.velocity(view), self.layout.velocity(view + 1));
-        let blocks: [(usize, SMatrix<f64, 9, 3>); 8] = [
-            (pose_i, by_from.fixed_columns::<3>(0).into_owned()),
-            (pose_i + 3, by_from.fixed_columns::<3>(3).into_owned()),
-            (pose_j, by_to.fixed_columns::<3>(0).into_owned()),
-            (pose_j + 3, by_to.fixed_columns::<3>(3).into_owned()),
-            (velocity_i, by_from.fixed_columns::<3>(6).into_owned()),
-            (velocity_j, by_to.fixed_columns::<3>(6).into_owned()),
-            (RefinementLayout::GYROSCOPE, by_bias.fixed_columns::<3>(0).into_owned()),
-            (RefinementLayout::ACCELEROMETER, by_bias.fixed_columns::<3>(3).into_owned()),
+        let by_gravity = whitening * jacobians.by_gravity * state.gravity_basis();
+        let blocks = [
+            (self.layout.pose(view), &by_from.columns(0, 6).into_owned()),
+            (self.layout.velocity(view), &by_from.columns(6, 3).into_owned()),
+            (self.layout.pose(view + 1), &by_to.columns(0, 6).into_owned()),
+            (self.layout.velocity(view + 1), &by_to.columns(6, 3).into_owned()),
+            (RefinementLayout::GYROSCOPE, &by_bias.columns(0, 6).into_owned()),
+            (RefinementLayout::GRAVITY, &by_gravity.columns(0, 2).into_owned()),
         ];
-        let gravity_block = whitening * jacobians.by_gravity * state.gravity_basis();
-        for (column_a, block_a) in &blocks {
-            let mut target = gradient.fixed_rows_mut::<3>(*column_a);
-            target += block_a.tr_mul(&residual);
-            for (column_b, block_b) in &blocks {
-                let mut target = normal.fixed_view_mut::<3, 3>(*column_a, *column_b);
-                target += block_a.tr_mul(block_b);
-            }
-            let cross = block_a.tr_mul(&gravity_block);
-            let mut target = normal.fixed_view_mut::<3, 2>(*column_a, RefinementLayout::GRAVITY);
-            target += cross;
-            let mut target = normal.fixed_view_mut::<2, 3>(RefinementLayout::GRAVITY, *column_a);
-            target += cross.transpose();
-        }
-        let mut target = gradient.fixed_rows_mut::<2>(RefinementLayout::GRAVITY);
-        target += gravity_block.tr_mul(&residual);
-        let mut target = normal.fixed_view_mut::<2, 2>(RefinementLayout::GRAVITY, RefinementLayout::GRAVITY);
-        target += gravity_block.tr_mul(&gravity_block);
+        equations.add_blocks(&residual, &blocks, 1.0);
     }
 
-    fn add_priors(&self, state: &RefinedState, normal: &mut DMatrix<f64>, gradient: &mut DVector<f64>) {
+    fn add_priors(&self, state: &RefinedState, equations: &mut NormalEquations<Dyn>) {
         let input = self.input;
         let mut add = |start: usize, residual: &Vector3<f64>, jacobian: &Matrix3<f64>, sigma: f64| {
-            let weight = 1.0 / sigma.max(MIN_SIGMA).powi(2);
-            let mut target = normal.fixed_view_mut::<3, 3>(start, start);
-            target += jacobian.tr_mul(jacobian) * weight;
-            let mut target = gradient.fixed_rows_mut::<3>(start);
-            target += jacobian.tr_mul(residual) * weight;
+            let block = jacobian.columns(0, 3).into_owned();
+            equations.add_blocks(residual, &[(start, &block)], 1.0 / sigma.max(MIN_SIGMA).powi(2));
         };
         let shared = so3::log(&state.common_rotation);
         add(
@@ -531,11 +487,8 @@ impl DampedProblem for &Refinement<'_> {
     }
 
     fn step(&mut self, state: &RefinedState, equations: &RefinementEquations, damping: f64) -> Option<RefinedState> {
-        let (mut normal, gradient, visual) = self.reduced(state, equations, damping);
-        for index in 0..gradient.len() {
-            normal[(index, index)] *= 1.0 + damping;
-        }
-        let step = -normal.cholesky()?.solve(&gradient);
+        let (reduced, visual) = self.reduced(state, equations, damping);
+        let step = reduced.solve(damping)?;
         let camera_steps = self.camera_steps(state, &step);
         let landmark_steps = equations.visual.substitute(&visual, |view| camera_steps[view]);
         Some(state.moved(&step, &self.layout, moved(&state.landmarks, &landmark_steps)))

@@ -1,11 +1,12 @@
 //! Relative pose of two views from bearing pairs: five-point hypotheses, rotation prior, robust refinement.
 
-use nalgebra::{Matrix3, Matrix5, UnitQuaternion, Vector3, Vector5};
+use nalgebra::{Const, Matrix3, UnitQuaternion, Vector3, Vector5};
 
 use super::bearing::angle_between;
 use super::essential::{decompose, five_point};
 use crate::geometry::{RigidTransform, SplitMix64, so3, tangent_basis};
-use crate::optimization::damped::{DampedOptions, DampedProblem, minimize};
+use crate::optimization::NormalEquations;
+use crate::optimization::damped::{DampedOptions, LeastSquares, minimize};
 
 /// Largest number of five-point samples drawn.
 const MAX_SAMPLES: usize = 160;
@@ -232,10 +233,10 @@ struct EpipolarFit<'a> {
     sigma_rad: f64,
 }
 
-impl DampedProblem for EpipolarFit<'_> {
+impl LeastSquares for EpipolarFit<'_> {
     type Estimate = RigidTransform;
-    /// Normal matrix and gradient by `[φ; 2 in the tangent plane of the translation]`.
-    type Equations = (Matrix5<f64>, Vector5<f64>);
+    /// By `[φ; 2 in the tangent plane of the translation]`.
+    type Equations = NormalEquations<Const<5>>;
 
     fn cost(&self, pose: &RigidTransform) -> f64 {
         robust_cost(self.pairs, pose, self.sigma_rad)
@@ -245,7 +246,7 @@ impl DampedProblem for EpipolarFit<'_> {
         let basis = tangent_basis(&pose.translation_m);
         let rotation = pose.rotation_matrix();
         let essential = essential_of(pose);
-        let (mut normal, mut gradient) = (Matrix5::<f64>::zeros(), Vector5::zeros());
+        let mut equations = NormalEquations::zeros(Const);
         for (bearing_i, bearing_j) in self.pairs {
             let length = ((essential * bearing_i).norm_squared() + essential.tr_mul(bearing_j).norm_squared()).sqrt();
             if length < 1e-12 {
@@ -257,26 +258,16 @@ impl DampedProblem for EpipolarFit<'_> {
             let row =
                 Vector5::new(by_rotation.x, by_rotation.y, by_rotation.z, by_direction.x, by_direction.y) / length;
             let weight = 1.0 / (1.0 + (residual / (2.0 * self.sigma_rad)).powi(2)).powi(2);
-            normal += row * row.transpose() * weight;
-            gradient += row * (residual * weight);
+            equations.hessian += row * row.transpose() * weight;
+            equations.gradient += row * (residual * weight);
         }
-        (normal, gradient)
+        equations
     }
 
-    fn step(
-        &mut self,
-        pose: &RigidTransform,
-        (normal, gradient): &Self::Equations,
-        damping: f64,
-    ) -> Option<RigidTransform> {
-        let mut damped = *normal;
-        for index in 0..5 {
-            damped[(index, index)] *= 1.0 + damping;
-        }
-        let step = -damped.cholesky()?.solve(gradient);
-        let rotation = pose.rotation * so3::exp(&step.fixed_rows::<3>(0).into_owned());
+    fn plus(&self, pose: &RigidTransform, step: &Vector5<f64>) -> RigidTransform {
+        let rotation = so3::plus(&pose.rotation, &step.fixed_rows::<3>(0).into_owned());
         let direction = pose.translation_m + tangent_basis(&pose.translation_m) * step.fixed_rows::<2>(3);
-        Some(RigidTransform::new(UnitQuaternion::new_normalize(rotation.into_inner()), direction.normalize()))
+        RigidTransform::new(rotation, direction.normalize())
     }
 }
 

@@ -16,7 +16,7 @@ use super::visual_problem::{
 use crate::frontend::{FeatureId, TrackedFeature};
 use crate::geometry::RigidTransform;
 use crate::optimization::damped::{DampedOptions, DampedProblem, minimize};
-use crate::optimization::{DensePoseEquations, Ray, ReprojectionEquations, TriangulationOptions, triangulate};
+use crate::optimization::{DensePoseEquations, Ray, ReprojectionEquations, TriangulationOptions, damp, triangulate};
 
 /// Smallest parallax of a landmark with a depth.
 const MIN_PARALLAX_RAD: f64 = 0.006;
@@ -402,9 +402,8 @@ impl DampedProblem for FreeViews {
                 hessian.fixed_view_mut::<6, 6>(6 * row, 6 * column).copy_from(&block);
             }
         }
-        for index in 0..6 * free {
-            hessian[(index, index)] = hessian[(index, index)] * (1.0 + damping) + 1e-9;
-        }
+        damp(&mut hessian, damping);
+        hessian += DMatrix::identity(6 * free, 6 * free) * 1e-9;
         let solved = hessian.cholesky()?.solve(&gradient);
         let pose_step = |view: usize| match view.checked_sub(1) {
             Some(free) => -solved.fixed_rows::<6>(6 * free),

@@ -1,11 +1,12 @@
 //! Fit of joint angles and chain parameters to the camera rotations of a solution.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, Dyn};
 
 use crate::estimator::factors::joint_motion::UNKNOWN_JOINT_SIGMA_RAD;
 use crate::estimator::state::calibration::Calibration;
 use crate::estimator::window::frames::Frames;
 use crate::geometry::{RigidTransform, so3};
+use crate::optimization::{NormalEquations, gauss_newton};
 
 /// Standard deviation of the initialization's rotations `imu_from_camera`.
 const EXTRINSICS_SIGMA_RAD: f64 = 0.01;
@@ -25,15 +26,12 @@ pub(super) fn fit_extrinsics(calibration: &mut Calibration, frames: &mut Frames,
         frames[slot].encoder.as_ref().map_or(UNKNOWN_JOINT_SIGMA_RAD, |encoder| encoder.sigmas_rad[joint])
     };
     let starts: Vec<Vec<f64>> = frames.iter().map(|frame| frame.state.joints_rad.clone()).collect();
-    let mut angles = starts.clone();
-    let mut fitted = calibration.clone();
-    for _ in 0..ROUNDS {
-        let mut hessian = DMatrix::zeros(total, total);
-        let mut gradient = DVector::zeros(total);
+    let linearize = |(fitted, angles): &(Calibration, Vec<Vec<f64>>)| {
+        let mut equations = NormalEquations::zeros(Dyn(total));
         if dof > 0 {
             let rows = fitted.prior_jacobian();
-            hessian.view_mut((0, 0), (dof, dof)).copy_from(&rows.tr_mul(&rows));
-            gradient.rows_mut(0, dof).copy_from(&rows.tr_mul(&fitted.prior_residual()));
+            equations.hessian.view_mut((0, 0), (dof, dof)).copy_from(&rows.tr_mul(&rows));
+            equations.gradient.rows_mut(0, dof).copy_from(&rows.tr_mul(&fitted.prior_residual()));
         }
         for (slot, extrinsics) in imu_from_camera.iter().enumerate() {
             let chain = fitted.linearize(&angles[slot]);
@@ -43,30 +41,25 @@ pub(super) fn fit_extrinsics(calibration: &mut Calibration, frames: &mut Frames,
             rows.columns_mut(0, dof).copy_from(&chain.by_parameters.fixed_rows::<3>(0));
             rows.columns_mut(place, joints).copy_from(&chain.by_joints.fixed_rows::<3>(0));
             let rows = so3::right_jacobian_inverse(&error) * rows / EXTRINSICS_SIGMA_RAD;
-            hessian += rows.tr_mul(&rows);
-            gradient += rows.tr_mul(&(error / EXTRINSICS_SIGMA_RAD));
+            equations.add(&(error / EXTRINSICS_SIGMA_RAD), &rows, 1.0);
             for joint in 0..joints {
-                let weight = sigma(slot, joint).powi(-2);
-                hessian[(place + joint, place + joint)] += weight;
-                gradient[place + joint] += (angles[slot][joint] - starts[slot][joint]) * weight;
+                let error_rad = angles[slot][joint] - starts[slot][joint];
+                equations.add_diagonal(place + joint, error_rad, sigma(slot, joint).powi(-2));
             }
         }
-        let Some(factor) = hessian.cholesky() else { return };
-        let step = -factor.solve(&gradient);
-        fitted = fitted.stepped(&step.as_slice()[..dof]);
-        for (slot, angles) in angles.iter_mut().enumerate() {
-            for (joint, angle) in angles.iter_mut().enumerate() {
-                *angle += step[dof + joints * slot + joint];
-            }
-        }
-        if step.amax() < 1e-6 {
-            break;
-        }
-    }
-    if angles.iter().flatten().all(|angle| angle.is_finite()) {
+        Some(equations)
+    };
+    let mut fit = (calibration.clone(), starts.clone());
+    let solved = gauss_newton(&mut fit, ROUNDS, linearize, |(fitted, angles), step| {
+        *fitted = fitted.stepped(&step.as_slice()[..dof]);
+        angles.iter_mut().flatten().zip(step.iter().skip(dof)).for_each(|(angle, change)| *angle += change);
+        step.amax() < 1e-6
+    });
+    if solved.is_some() {
+        let angles;
+        (*calibration, angles) = fit;
         for (frame, angles) in frames.iter_mut().zip(angles) {
             frame.state.joints_rad = angles;
         }
-        *calibration = fitted;
     }
 }

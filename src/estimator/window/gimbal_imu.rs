@@ -1,6 +1,6 @@
 //! Prediction of the newest frame by the IMU on the gimbal.
 
-use nalgebra::{DMatrix, DVector, UnitQuaternion};
+use nalgebra::{Dyn, UnitQuaternion};
 
 use super::setup::Setup;
 use super::window_state::WindowState;
@@ -12,6 +12,7 @@ use crate::estimator::state::navigation::NavigationState;
 use crate::estimator::state::preintegration::Preintegration;
 use crate::estimator::step_input::StepInput;
 use crate::geometry::so3;
+use crate::optimization::{NormalEquations, gauss_newton};
 
 /// Damping of the fit of joint angles: near parallel axes the angles keep their values.
 const DAMPING: f64 = 1e-4;
@@ -65,22 +66,19 @@ impl WindowState {
 /// Gauss–Newton; `None` if they are not finite.
 fn joints_at(calibration: &Calibration, start_rad: &[f64], imu_from_camera: &UnitQuaternion<f64>) -> Option<Vec<f64>> {
     let mut angles_rad = start_rad.to_vec();
-    for _ in 0..ROUNDS {
-        let chain = calibration.linearize(&angles_rad);
+    let linearize = |angles_rad: &Vec<f64>| {
+        let chain = calibration.linearize(angles_rad);
         let error = so3::log(&(chain.imu_from_camera.rotation.inverse() * imu_from_camera));
-        let by_joints = chain.by_joints.fixed_rows::<3>(0).into_owned();
-        let count = by_joints.ncols();
-        let information: DMatrix<f64> = DMatrix::from_fn(count, count, |row, column| {
-            by_joints.column(row).dot(&by_joints.column(column)) + if row == column { DAMPING } else { 0.0 }
-        });
-        let right = DVector::from_fn(count, |joint, _| by_joints.column(joint).dot(&error));
-        let step = information.cholesky()?.solve(&right);
-        for (angle, change) in angles_rad.iter_mut().zip(step.iter()) {
-            *angle += change;
+        let mut equations = NormalEquations::zeros(Dyn(angles_rad.len()));
+        equations.add(&-error, &chain.by_joints.fixed_rows::<3>(0), 1.0);
+        for joint in 0..angles_rad.len() {
+            equations.add_diagonal(joint, 0.0, DAMPING);
         }
-        if step.amax() < 1e-6 {
-            break;
-        }
-    }
-    angles_rad.iter().all(|angle| angle.is_finite()).then_some(angles_rad)
+        Some(equations)
+    };
+    gauss_newton(&mut angles_rad, ROUNDS, linearize, |angles_rad, step| {
+        angles_rad.iter_mut().zip(step.iter()).for_each(|(angle, change)| *angle += change);
+        step.amax() < 1e-6
+    })?;
+    Some(angles_rad)
 }

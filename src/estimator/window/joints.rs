@@ -1,6 +1,6 @@
 //! Joint angles of the frames: initial values, and the encoder readings of dropped frames.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DVector, Dyn};
 
 use super::setup::Setup;
 use super::window_state::WindowState;
@@ -9,7 +9,7 @@ use crate::estimator::state::calibrations::MAIN;
 use crate::estimator::state::camera_pose::{self, CameraMaps};
 use crate::estimator::state::camera_view::CameraView;
 use crate::geometry::wrap_angle;
-use crate::optimization::{RelativePose, reprojection};
+use crate::optimization::{NormalEquations, RelativePose, gauss_newton, reprojection};
 use crate::sensors::JointAngles;
 
 /// Smallest number of landmarks that constrain the joint angles of a frame.
@@ -40,21 +40,18 @@ impl WindowState {
         let prior = DVector::from_fn(joints, |joint, _| sigma_rad(joint).powi(-2));
         let start = self.frames[slot].state.joints_rad.clone();
         let mut angles = start.clone();
-        for _ in 0..5 {
-            let (hessian, gradient, _) = self.joints_by_landmarks(setup, slot, &angles, &view);
-            let hessian = hessian + DMatrix::from_diagonal(&prior);
-            let gradient =
-                gradient + DVector::from_fn(joints, |joint, _| (angles[joint] - start[joint]) * prior[joint]);
-            let Some(factor) = hessian.cholesky() else { return };
-            let step = factor.solve(&gradient);
-            for (angle, change) in angles.iter_mut().zip(step.iter()) {
-                *angle -= change;
+        let linearize = |angles: &Vec<f64>| {
+            let (mut equations, _) = self.joints_by_landmarks(setup, slot, angles, &view);
+            for joint in 0..joints {
+                equations.add_diagonal(joint, angles[joint] - start[joint], prior[joint]);
             }
-            if step.amax() < 1e-5 {
-                break;
-            }
-        }
-        if angles.iter().all(|angle| angle.is_finite()) {
+            Some(equations)
+        };
+        let solved = gauss_newton(&mut angles, 5, linearize, |angles, step| {
+            angles.iter_mut().zip(step.iter()).for_each(|(angle, change)| *angle += change);
+            step.amax() < 1e-5
+        });
+        if solved.is_some() {
             self.frames[slot].state.joints_rad = angles;
         }
     }
@@ -67,7 +64,7 @@ impl WindowState {
         slot: usize,
         angles_rad: &[f64],
         view: &CameraView<'_>,
-    ) -> (DMatrix<f64>, DVector<f64>, usize) {
+    ) -> (NormalEquations<Dyn>, usize) {
         let joints = angles_rad.len();
         let sigma = self.visual_model(setup, MAIN).sigma_px;
         let mut state = self.frames[slot].state.clone();
@@ -77,8 +74,7 @@ impl WindowState {
         let first_row = camera_at(0.0);
         let own = CameraMaps::of_sensor(std::slice::from_ref(&state), &sensor).own.remove(0);
         let by_joints = own.columns(6, joints).into_owned();
-        let mut hessian = DMatrix::zeros(joints, joints);
-        let mut gradient = DVector::zeros(joints);
+        let mut equations = NormalEquations::zeros(Dyn(joints));
         let mut count = 0;
         for feature in self.features[MAIN].values() {
             let (Some(anchor), Some(landmark), Some(seen)) =
@@ -96,18 +92,16 @@ impl WindowState {
             };
             let squared = term.residual.norm_squared() / (sigma * sigma);
             let weight = 1.0 / (sigma * sigma * squared.sqrt().max(1.0));
-            let rows = term.by_observer * &by_joints;
-            hessian += rows.tr_mul(&rows) * weight;
-            gradient += rows.tr_mul(&term.residual) * weight;
+            equations.add(&term.residual, &(term.by_observer * &by_joints), weight);
             count += 1;
         }
-        (hessian, gradient, count)
+        (equations, count)
     }
 
     /// Variances of a frame's joint angles from the image alone, `None` with too few landmarks.
     fn visual_variances(&self, setup: &Setup, slot: usize, view: &CameraView<'_>) -> Option<DVector<f64>> {
-        let (hessian, _, count) = self.joints_by_landmarks(setup, slot, &self.frames[slot].state.joints_rad, view);
-        let inverse = hessian.cholesky()?.inverse();
+        let (equations, count) = self.joints_by_landmarks(setup, slot, &self.frames[slot].state.joints_rad, view);
+        let inverse = equations.hessian.cholesky()?.inverse();
         (count >= MIN_LANDMARKS).then(|| inverse.diagonal())
     }
 

@@ -1,11 +1,12 @@
 //! Offset, drift, rotation, scale and bias by robust least squares on rotation vectors.
 
-use nalgebra::{SMatrix, SVector, UnitQuaternion, Vector3};
+use nalgebra::{Const, SMatrix, SVector, UnitQuaternion, Vector3};
 use serde::Serialize;
 
 use super::super::statistics::median;
 use super::series::{MIN_ROTATIONS, PairRotation, RotationReference};
-use crate::geometry::{best_rotation, ns_from_seconds, seconds_from_ns, so3};
+use crate::geometry::{best_rotation, consecutive_correlation, ns_from_seconds, seconds_from_ns, so3};
+use crate::optimization::{NormalEquations, gauss_newton};
 
 /// Prior standard deviation of the drift between two quartz clocks.
 const DRIFT_SIGMA: f64 = 1e-4;
@@ -30,7 +31,6 @@ const SIGMA_PER_MEDIAN_NORM: f64 = 1.0 / 1.538;
 /// Unknowns: offset, drift, rotation (3), scale, bias of the reference (3).
 const UNKNOWNS: usize = 9;
 type Information = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
-type Gradient = SVector<f64, UNKNOWNS>;
 
 /// Best solution near one offset.
 pub(super) struct Refined {
@@ -40,7 +40,7 @@ pub(super) struct Refined {
     middle_s: f64,
     camera_from_body: UnitQuaternion<f64>,
     scale: f64,
-    /// Rotation of the body per second that the reference lacks, in rad/s.
+    /// Bias of the gyroscope, in rad/s.
     bias: Vector3<f64>,
     bias_sigma_rad_per_s: f64,
     covariance: Information,
@@ -86,18 +86,19 @@ pub(super) fn refine(measured: &[PairRotation], reference: &RotationReference, o
     };
     let first_rows = state.rows(measured, reference);
     state.camera_from_body = constant_rotation(&first_rows)?;
-    for _ in 0..ITERATIONS {
-        let rows = state.rows(measured, reference);
-        if rows.len() < MIN_ROTATIONS {
-            return None;
-        }
-        let update = state.update(&rows)?;
-        if update.abs() < CONVERGED_S {
-            state.finish(&rows)?;
-            return Some(state);
-        }
+    let mut rows = Vec::new();
+    let linearize = |state: &Refined| {
+        rows = state.rows(measured, reference);
+        (rows.len() >= MIN_ROTATIONS).then(|| state.normal_equations(&rows))
+    };
+    let mut converged = false;
+    gauss_newton(&mut state, ITERATIONS, linearize, |state, step| {
+        converged = state.update(step).abs() < CONVERGED_S;
+        converged
+    })?;
+    if !converged {
+        rows = state.rows(measured, reference);
     }
-    let rows = state.rows(measured, reference);
     state.finish(&rows)?;
     Some(state)
 }
@@ -156,43 +157,36 @@ impl Refined {
     }
 
     /// Normal equations in units of the residuals' variance, with the prior of the drift.
-    fn normal_equations(&self, rows: &[Row]) -> (Information, Gradient) {
+    fn normal_equations(&self, rows: &[Row]) -> NormalEquations<Const<UNKNOWNS>> {
         let sigma_rad = self.sigma_rad(rows);
-        let (mut information, mut gradient) = (Information::zeros(), Gradient::zeros());
+        let mut equations = NormalEquations::zeros(Const);
         for row in rows {
             let residual = self.residual(row);
             let jacobian = self.jacobian(row);
             let weight = Self::weight(&residual, sigma_rad) / (sigma_rad * sigma_rad);
-            information += weight * jacobian.transpose() * jacobian;
-            gradient += weight * jacobian.transpose() * residual;
+            equations.hessian += weight * jacobian.transpose() * jacobian;
+            equations.gradient -= weight * jacobian.transpose() * residual;
         }
-        information[(1, 1)] += 1.0 / (DRIFT_SIGMA * DRIFT_SIGMA);
-        gradient[1] -= self.drift / (DRIFT_SIGMA * DRIFT_SIGMA);
-        information[(5, 5)] += 1.0 / (SCALE_SIGMA * SCALE_SIGMA);
-        gradient[5] -= (self.scale - 1.0) / (SCALE_SIGMA * SCALE_SIGMA);
+        equations.add_diagonal(1, self.drift, DRIFT_SIGMA.powi(-2));
+        equations.add_diagonal(5, self.scale - 1.0, SCALE_SIGMA.powi(-2));
         for axis in 0..3 {
-            information[(6 + axis, 6 + axis)] += self.bias_sigma_rad_per_s.powi(-2);
-            gradient[6 + axis] -= self.bias[axis] * self.bias_sigma_rad_per_s.powi(-2);
+            equations.add_diagonal(6 + axis, self.bias[axis], self.bias_sigma_rad_per_s.powi(-2));
+            // With rotations about one axis only, the rotation about that axis is unobservable.
+            equations.add_diagonal(2 + axis, 0.0, 1.0);
         }
-        // With rotations about one axis only, the rotation about that axis is unobservable.
-        for axis in 2..5 {
-            information[(axis, axis)] += 1.0;
-        }
-        (information, gradient)
+        equations
     }
 
-    /// One Gauss–Newton iteration; returns the update of the offset in seconds.
-    fn update(&mut self, rows: &[Row]) -> Option<f64> {
-        let (information, gradient) = self.normal_equations(rows);
-        let step = information.cholesky()?.solve(&gradient);
+    /// Moves the unknowns by a step; returns the update of the offset in seconds.
+    fn update(&mut self, step: &SVector<f64, UNKNOWNS>) -> f64 {
         let damping = (MAX_UPDATE_S / step[0].abs().max(1e-12)).min(1.0);
         let step = step * damping;
         self.offset_s += step[0];
         self.drift += step[1];
-        self.camera_from_body = so3::exp(&Vector3::new(step[2], step[3], step[4])) * self.camera_from_body;
+        self.camera_from_body = so3::plus_left(&self.camera_from_body, &Vector3::new(step[2], step[3], step[4]));
         self.scale = (self.scale + step[5]).clamp(0.3, 3.0);
         self.bias += Vector3::new(step[6], step[7], step[8]);
-        Some(step[0])
+        step[0]
     }
 
     fn finish(&mut self, rows: &[Row]) -> Option<()> {
@@ -200,12 +194,10 @@ impl Refined {
             return None;
         }
         let sigma_rad = self.sigma_rad(rows);
-        let (information, _) = self.normal_equations(rows);
+        let information = self.normal_equations(rows).hessian;
         // Residuals of consecutive images may be correlated; the variance grows accordingly.
         let residuals: Vec<Vector3<f64>> = rows.iter().map(|row| self.residual(row)).collect();
-        let squares: f64 = residuals.iter().map(Vector3::norm_squared).sum();
-        let products: f64 = residuals.windows(2).map(|pair| pair[0].dot(&pair[1])).sum();
-        let correlation = (products / squares.max(1e-30)).clamp(0.0, 0.95);
+        let correlation = consecutive_correlation(&residuals, 0.95);
         self.covariance = information.try_inverse()? * ((1.0 + correlation) / (1.0 - correlation));
         let weighted = |value: &dyn Fn(&Row) -> f64| -> f64 {
             rows.iter().map(|row| Self::weight(&self.residual(row), sigma_rad) * value(row)).sum()

@@ -72,7 +72,8 @@ fn gradient_of_the_refinement_meets_central_differences() {
         };
         let refinement = Refinement::new(&input).unwrap();
         // A damping of 1e15 on the depths leaves the plain gradient at fixed depths.
-        let (normal, gradient, _) = refinement.reduced(&state, &refinement.linearized(&state), 1e15);
+        let (reduced, _) = refinement.reduced(&state, &refinement.linearized(&state), 1e15);
+        let (normal, gradient) = (reduced.hessian, reduced.gradient);
         assert!((&normal - normal.transpose()).amax() < 1e-9 * normal.amax());
         let fixed_columns = refinement.layout.pose(0);
         for column in 0..refinement.layout.columns() {
