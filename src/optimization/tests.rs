@@ -1,6 +1,6 @@
 use nalgebra::{Const, DMatrix, DVector, Dyn, Matrix2, Vector2, Vector3, Vector6};
 
-use super::damped::{DampedEquations, DampedOptions, DampedProblem, StopReason, minimize};
+use super::damped::{DampedEquations as _, DampedOptions, DampedProblem, StopReason, minimize};
 use super::reprojection::{self, BearingProjection, TangentPlane};
 use super::{
     BlockTerm, CameraPose, Cholesky, DensePoseEquations, Landmark, LandmarkRows, LossSum, NormalEquations, Ray,
