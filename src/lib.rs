@@ -6,7 +6,7 @@
 //!
 //! | folder | contents | does not depend on |
 //! | --- | --- | --- |
-//! | [`text`] | `KEY=VALUE` entries, tables of keys, names of enums | what the keys mean |
+//! | [`text`] | `KEY=VALUE` entries, tables of keys, conditions, names of enums | what the keys mean |
 //! | [`geometry`] | rotations, rigid transforms, the one perturbation rule, time units | cameras, logs |
 //! | [`camera`] | projection and back-projection with their Jacobians | gimbals, images |
 //! | [`gimbal`] | the actuated chain in each parameterization, its Jacobians, conversions and singularity margins | measurements |

@@ -1,6 +1,7 @@
-//! Texts that people write and read: `KEY=VALUE` entries, tables of keys, names of enums, command lines.
+//! Texts that people write and read: `KEY=VALUE` entries, tables of keys, conditions, names of enums, command lines.
 
 mod command_line;
+pub(crate) mod condition;
 mod counted;
 mod entry;
 mod keys;

@@ -2,8 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::evaluate::{NamedValue, StepContext};
-use super::expression::Condition;
+use super::condition::{Condition, NamedValue, StepContext};
 use crate::gimbal::ParameterNames;
 use crate::session::record::{Recording, RunRecord};
 

@@ -4,20 +4,15 @@
 //! `not`. A comparison is false if the step lacks its quantity (a rank during initialization). A breakpoint is hit
 //! where its condition becomes true.
 
-mod evaluate;
-mod expression;
-mod lexer;
+mod condition;
+mod language;
 mod list;
-mod parser;
 mod quantities;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use expression::{ComparisonOperator, TextRange};
-pub(crate) use lexer::{Token, tokens_with_single_equals};
-pub(crate) use parser::factor_of_unit;
-
-pub use evaluate::{NamedValue, StepContext};
-pub use expression::{Condition, ConditionProblem};
+pub use condition::{Condition, NamedValue, StepContext};
 pub use list::{Breakpoint, Breakpoints, Hit};
 pub use quantities::quantity_help;
+
+pub use crate::text::condition::ConditionProblem;

@@ -3,6 +3,28 @@
 use crate::estimator::{EventKind, Phase};
 use crate::geometry::seconds_from_ns;
 use crate::session::record::StepRecord;
+use crate::text::condition::Number;
+
+/// A quantity of a step.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Quantity {
+    Plain(NumberName),
+    /// With an argument: `sigma(yaw.alpha)`.
+    Named(NamedNumber, String),
+    /// A singular value by its number from 1, largest first: `singular(1)`.
+    Singular(usize),
+    /// The difference from the step before: `rise(x)`.
+    Rise(Box<Number<Self>>),
+}
+
+/// A property of a step in a condition.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum StepFlag {
+    Literal(bool),
+    Named(FlagName),
+    /// The step has an event of one of these kinds.
+    Event(Vec<EventKind>),
+}
 
 /// A quantity without an argument.
 #[derive(Clone, Copy, Debug)]

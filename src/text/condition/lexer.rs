@@ -45,17 +45,9 @@ const SIGNS: [(&str, Token); 19] = [
     ("%", Token::Percent),
 ];
 
-/// The tokens with their positions; the last one is [`Token::End`].
-pub(super) fn tokens(text: &str) -> Result<Vec<(Token, TextRange)>, ConditionProblem> {
-    scan(text, false)
-}
-
-/// As [`tokens`], but a single `=` is also accepted as a comparison.
-pub(crate) fn tokens_with_single_equals(text: &str) -> Result<Vec<(Token, TextRange)>, ConditionProblem> {
-    scan(text, true)
-}
-
-fn scan(text: &str, single_equals: bool) -> Result<Vec<(Token, TextRange)>, ConditionProblem> {
+/// The tokens with their positions; the last one is [`Token::End`]. With `single_equals` a single `=` compares as `==`
+/// does.
+pub(super) fn tokens(text: &str, single_equals: bool) -> Result<Vec<(Token, TextRange)>, ConditionProblem> {
     let characters: Vec<char> = text.chars().collect();
     let problem = |at: usize, message: String| ConditionProblem { text: text.to_owned(), column: at + 1, message };
     let mut tokens = Vec::new();
