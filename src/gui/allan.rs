@@ -1,11 +1,10 @@
 //! Figure of the Allan deviation of gyroscope and accelerometer. Above each plot: the suggested rig values. In the
 //! plot: the axes with their confidence, the fitted sum of terms, and the rig's densities.
 
-use egui::epaint::{Mesh, Vertex, WHITE_UV};
 use egui::{Align2, Color32, FontFamily, FontId, Painter, Pos2, Rect, Shape, Stroke, Ui, pos2, vec2};
 
-use crate::gui::plot::paint_ground;
-use crate::gui::theme::{CURVE_WIDTH, HAIRLINE_WIDTH, Theme, label_font, number_font};
+use crate::gui::plot::{ValueAxis, ValuePlot, paint_between, paint_ground};
+use crate::gui::theme::{CURVE_WIDTH, Theme, label_font};
 use crate::log_check::{AllanReport, NoiseTerm, SensorNoise};
 
 /// Space above a plot for the result, in points.
@@ -19,83 +18,32 @@ const AGREES: f64 = 1.5;
 /// Radius of a marker in points.
 const MARKER: f32 = 4.5;
 
-/// A plot with both axes logarithmic.
-struct LogLog {
-    rect: Rect,
-    /// Powers of ten at the edges of the plot.
-    x: (f64, f64),
-    y: (f64, f64),
+/// Plot whose logarithmic axes contain all deviations of a sensor and its markers.
+fn plot_of(sensor: &SensorNoise, rect: Rect) -> Option<ValuePlot> {
+    let points = || sensor.axes.iter().flat_map(|axis| &axis.points);
+    let axis = |values: &mut dyn Iterator<Item = f64>, room: f64| {
+        let positive = values.filter(|value| *value > 0.0);
+        let (low, high) = positive.fold((f64::INFINITY, 0.0), |(low, high), it| (it.min(low), it.max(high)));
+        ValueAxis { logarithmic: true, low: low / 10_f64.powf(room), high: high * 10_f64.powf(room) }
+    };
+    let x = axis(&mut points().map(|point| point.tau_s).chain([1.0]), 0.05);
+    let deviations = points().flat_map(|point| [point.low, point.deviation]);
+    let y = axis(&mut deviations.chain(marks(sensor).map(|it| it.1)), 0.12);
+    let several = points().any(|point| point.tau_s != 1.0);
+    (several && y.low < y.high).then_some(ValuePlot { rect, x, y })
 }
 
-impl LogLog {
-    /// Axes whose ranges contain all deviations of a sensor and its markers.
-    fn of(sensor: &SensorNoise, rect: Rect) -> Option<Self> {
-        let points = || sensor.axes.iter().flat_map(|axis| &axis.points);
-        let range = |values: &mut dyn Iterator<Item = f64>| {
-            values
-                .filter(|value| *value > 0.0)
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
-        };
-        let x = range(&mut points().map(|point| point.tau_s).chain([1.0]));
-        let y = range(&mut points().flat_map(|point| [point.low, point.deviation]).chain(marks(sensor).map(|it| it.1)));
-        if !(x.0 < x.1 && y.0 <= y.1) {
-            return None;
-        }
-        let log = |(low, high): (f64, f64), room: f64| (low.log10() - room, high.log10() + room);
-        Some(Self { rect, x: log(x, 0.05), y: log(y, 0.12) })
-    }
-
-    fn at(&self, tau_s: f64, deviation: f64) -> Pos2 {
-        let place =
-            |value: f64, (low, high): (f64, f64)| ((value.log10() - low) / (high - low)).clamp(-2.0, 3.0) as f32;
-        pos2(
-            self.rect.left() + place(tau_s, self.x) * self.rect.width(),
-            self.rect.bottom() - place(deviation.max(1e-300), self.y) * self.rect.height(),
-        )
-    }
-
-    /// Draws decades with lines and values, and thinner lines at 2 and 5.
-    fn grid(&self, painter: &Painter, theme: &Theme) {
-        let stroke = |strong: bool| {
-            let color = if strong { theme.hatch } else { theme.grid };
-            Stroke::new(HAIRLINE_WIDTH, color)
-        };
-        let digits = |(low, high): (f64, f64)| {
-            (low.floor() as i32..=high.ceil() as i32)
-                .flat_map(|power| [1.0, 2.0, 5.0].map(|digit| (power, digit)))
-                .filter(move |(power, digit): &(i32, f64)| (low..=high).contains(&(f64::from(*power) + digit.log10())))
-        };
-        for (power, digit) in digits(self.x) {
-            let value = digit * 10_f64.powi(power);
-            let x = self.at(value, 1.0).x;
-            painter.vline(x, self.rect.y_range(), stroke(digit == 1.0));
-            if digit == 1.0 {
-                let text = if (-3..=4).contains(&power) { format!("{value}") } else { format!("1e{power}") };
-                painter.text(
-                    pos2(x, self.rect.bottom() + 3.0),
-                    Align2::CENTER_TOP,
-                    text,
-                    number_font(),
-                    theme.text_weak,
-                );
-            }
-        }
-        let few = self.y.1 - self.y.0 < 1.2;
-        for (power, digit) in digits(self.y) {
-            let y = self.at(1.0, digit * 10_f64.powi(power)).y;
-            painter.hline(self.rect.x_range(), y, stroke(digit == 1.0));
-            if digit == 1.0 || few {
-                let text = format!("{digit}e{power}");
-                painter.text(
-                    pos2(self.rect.left() - 4.0, y),
-                    Align2::RIGHT_CENTER,
-                    text,
-                    number_font(),
-                    theme.text_weak,
-                );
-            }
-        }
-    }
+/// Draws decades with lines and values, and thinner lines at 2 and 5.
+fn grid(painter: &Painter, theme: &Theme, plot: &ValuePlot) {
+    let columns = plot.x.decade_lines(theme, |power, digit, value| match power {
+        _ if digit != 1.0 => String::new(),
+        -3..=4 => format!("{value}"),
+        _ => format!("1e{power}"),
+    });
+    plot.paint_columns(painter, theme, 3.0, columns);
+    let few = (plot.y.high / plot.y.low).log10() < 1.2;
+    let label = |power, digit, _| if digit == 1.0 || few { format!("{digit}e{power}") } else { String::new() };
+    plot.paint_rows(painter, theme, 4.0, plot.y.decade_lines(theme, label));
 }
 
 /// Points at which the terms of a sensor are read, with their letters: white noise at 1 s, the minimum, the random walk
@@ -143,8 +91,8 @@ fn sensor_ui(painter: &Painter, theme: &Theme, sensor: &SensorNoise, rect: Rect)
     head(painter, theme, sensor, rect);
     let plot = Rect::from_min_max(rect.min + vec2(LEFT + 8.0, HEAD), rect.max - vec2(14.0, BELOW));
     paint_ground(painter, theme, plot);
-    let Some(axes) = LogLog::of(sensor, plot) else { return };
-    axes.grid(painter, theme);
+    let Some(axes) = plot_of(sensor, plot) else { return };
+    grid(painter, theme, &axes);
     let below = pos2(plot.center().x, plot.bottom() + 18.0);
     painter.text(below, Align2::CENTER_TOP, "averaging time τ, s", label_font(), theme.text_weak);
     painter.text(
@@ -157,18 +105,8 @@ fn sensor_ui(painter: &Painter, theme: &Theme, sensor: &SensorNoise, rect: Rect)
     let inside = painter.with_clip_rect(plot);
     let colors = [theme.axis_x, theme.axis_y, theme.axis_z];
     for (axis, color) in sensor.axes.iter().zip(colors) {
-        let mut mesh = Mesh::default();
-        for point in &axis.points {
-            for value in [point.low, point.high] {
-                let pos = axes.at(point.tau_s, value);
-                mesh.vertices.push(Vertex { pos, uv: WHITE_UV, color: color.gamma_multiply(0.22) });
-            }
-        }
-        for corner in (2..mesh.vertices.len() as u32).step_by(2) {
-            mesh.add_triangle(corner - 2, corner - 1, corner);
-            mesh.add_triangle(corner - 1, corner, corner + 1);
-        }
-        inside.add(Shape::mesh(mesh));
+        let band = axis.points.iter().map(|point| [point.low, point.high].map(|value| axes.at(point.tau_s, value)));
+        paint_between(&inside, band, color.gamma_multiply(0.22));
     }
     for (axis, color) in sensor.axes.iter().zip(colors) {
         let line: Vec<Pos2> = axis.points.iter().map(|point| axes.at(point.tau_s, point.deviation)).collect();
@@ -197,24 +135,21 @@ fn label(painter: &Painter, theme: &Theme, at: Pos2, text: &str) {
 }
 
 /// The slopes on which white noise and random walk are read.
-fn asymptotes(painter: &Painter, theme: &Theme, sensor: &SensorNoise, axes: &LogLog) {
+fn asymptotes(painter: &Painter, theme: &Theme, sensor: &SensorNoise, axes: &ValuePlot) {
     let terms = [(&sensor.terms.white, -0.5, 1.0), (&sensor.terms.random_walk, 0.5, 3.0)];
     for (value, slope, read_at_s) in terms.into_iter().filter_map(|(term, slope, at)| Some((term.value?, slope, at))) {
-        let ends = [axes.x.0, axes.x.1].map(|power| {
-            let tau_s = 10_f64.powf(power);
-            axes.at(tau_s, value * (tau_s / read_at_s).powf(slope))
-        });
+        let ends = [axes.x.low, axes.x.high].map(|tau_s| axes.at(tau_s, value * (tau_s / read_at_s).powf(slope)));
         painter.extend(Shape::dotted_line(&ends, theme.text_weak, 4.0, 0.8));
     }
 }
 
 /// The deviation of the rig's densities: `√(N²/τ + K² τ/3)`.
-fn given_line(painter: &Painter, theme: &Theme, sensor: &SensorNoise, axes: &LogLog) {
+fn given_line(painter: &Painter, theme: &Theme, sensor: &SensorNoise, axes: &ValuePlot) {
     let Some(given) = sensor.given else { return };
     let steps = 80;
     let line: Vec<Pos2> = (0..=steps)
         .map(|step| {
-            let tau_s = 10_f64.powf(axes.x.0 + (axes.x.1 - axes.x.0) * f64::from(step) / f64::from(steps));
+            let tau_s = axes.x.low * (axes.x.high / axes.x.low).powf(f64::from(step) / f64::from(steps));
             axes.at(tau_s, (given.white.powi(2) / tau_s + given.random_walk.powi(2) * tau_s / 3.0).sqrt())
         })
         .collect();
@@ -222,7 +157,7 @@ fn given_line(painter: &Painter, theme: &Theme, sensor: &SensorNoise, axes: &Log
 }
 
 /// The mean of the fitted axes.
-fn model_line(painter: &Painter, theme: &Theme, sensor: &SensorNoise, axes: &LogLog) {
+fn model_line(painter: &Painter, theme: &Theme, sensor: &SensorNoise, axes: &ValuePlot) {
     let Some(first) = sensor.axes.first() else { return };
     let line: Option<Vec<Pos2>> = (0..first.points.len())
         .map(|index| {

@@ -25,7 +25,7 @@ mod panel;
 #[cfg(test)]
 mod panel_tests;
 mod path_field;
-mod plot;
+pub(crate) mod plot;
 pub mod rank;
 mod reading;
 pub mod rendering;

@@ -4,7 +4,7 @@
 use egui::{Align2, Color32, FontFamily, FontId, Painter, Pos2, Rect, Stroke, Ui, pos2, vec2};
 
 use crate::calibration::stills::{AngleModel, ScoredChain, SetReport, StillsOutcome, ViewReport};
-use crate::gui::plot::paint_ground;
+use crate::gui::plot::{ValueAxis, ValuePlot, paint_ground};
 use crate::gui::theme::{HAIRLINE_WIDTH, Theme, label_font, number_font};
 
 /// Space left of a plot for the values of its axis, in points.
@@ -161,26 +161,16 @@ fn errors(painter: &Painter, theme: &Theme, outcome: &StillsOutcome, plot: Rect)
     if !(low <= high && high.is_finite()) {
         return;
     }
-    let (low, high) = ((low / 1.3).log10(), (high * 1.3).log10());
-    let y = |value: f64| plot.bottom() - ((value.log10() - low) / (high - low)) as f32 * plot.height();
-    for power in low.floor() as i32..=high.ceil() as i32 {
-        for digit in [1.0, 2.0, 5.0] {
-            let value = digit * 10_f64.powi(power);
-            if (low..=high).contains(&value.log10()) {
-                let color = if digit == 1.0 { theme.hatch } else { theme.grid };
-                painter.hline(plot.x_range(), y(value), Stroke::new(HAIRLINE_WIDTH, color));
-                let at = pos2(plot.left() - 6.0, y(value));
-                painter.text(at, Align2::RIGHT_CENTER, format!("{value}"), number_font(), theme.text_weak);
-            }
-        }
-    }
+    let sets = ValueAxis { logarithmic: false, low: -0.5, high: outcome.sets.len() as f64 - 0.5 };
+    let errors_px = ValueAxis { logarithmic: true, low: low / 1.3, high: high * 1.3 };
+    let axes = ValuePlot { rect: plot, x: sets, y: errors_px };
+    axes.paint_rows(painter, theme, 6.0, errors_px.decade_lines(theme, |_, _, value| format!("{value}")));
     let above = pos2(plot.left() - 44.0, plot.top() - 5.0);
     painter.text(above, Align2::LEFT_BOTTOM, "error in the rigid cameras, px", label_font(), theme.text_weak);
     for (place, set) in outcome.sets.iter().enumerate() {
-        let x = set_x(outcome, plot, place);
         for series in &all {
             if let Some(value) = mean(set, series.of).filter(|value| *value > 0.0) {
-                marker(painter, pos2(x, y(value)), series.color, series.filled);
+                marker(painter, axes.at(place as f64, value), series.color, series.filled);
             }
         }
     }

@@ -8,6 +8,7 @@ use maud::{Markup, html};
 use super::{AlignmentEvidence, VideoAlignment};
 use crate::export::ExportError;
 use crate::flight_log::output::write_file;
+use crate::gui::plot::ticks;
 use crate::log_check::ClockAlignment;
 
 /// Size of the drawing, and margins of both plots in it.
@@ -51,14 +52,6 @@ impl Plot {
     }
 
     fn frame(&self, title: &str, x_label: &str, y_label: &str) -> Markup {
-        let ticks = |(low, high): (f64, f64)| -> Vec<f64> {
-            let rough = (high - low) / 8.0;
-            let power = 10.0_f64.powf(rough.abs().max(1e-12).log10().floor());
-            let step =
-                [1.0, 2.0, 5.0, 10.0].map(|k| k * power).into_iter().find(|step| *step >= rough).unwrap_or(rough);
-            let first = (low / step).ceil() as i64;
-            (first..).map(|k| k as f64 * step).take_while(|value| *value <= high && step > 0.0).take(20).collect()
-        };
         let name = |value: f64| format!("{}", (value * 1e6).round() / 1e6);
         html! {
             rect x=(LEFT) y=(self.top) width=(RIGHT - LEFT) height=(self.bottom - self.top) fill="none" stroke="#999" {}
@@ -66,11 +59,11 @@ impl Plot {
             text x=(RIGHT) y=(self.bottom + 34.0) text-anchor="end" { (x_label) }
             text x="16" y=(0.5 * (self.top + self.bottom)) text-anchor="middle"
                 transform={ "rotate(-90 16 " (0.5 * (self.top + self.bottom)) ")" } { (y_label) }
-            @for value in ticks(self.x) {
+            @for value in ticks(self.x.0, self.x.1, 8).0 {
                 line x1=(self.at(value, 0.0).0) x2=(self.at(value, 0.0).0) y1=(self.bottom) y2=(self.bottom + 5.0) stroke="#999" {}
                 text x=(self.at(value, 0.0).0) y=(self.bottom + 18.0) text-anchor="middle" { (name(value)) }
             }
-            @for value in ticks(self.y) {
+            @for value in ticks(self.y.0, self.y.1, 8).0 {
                 line x1=(LEFT - 5.0) x2=(LEFT) y1=(self.at(0.0, value).1) y2=(self.at(0.0, value).1) stroke="#999" {}
                 text x=(LEFT - 8.0) y=(self.at(0.0, value).1 + 4.0) text-anchor="end" { (name(value)) }
             }

@@ -3,7 +3,7 @@
 use egui::{Align2, Painter, Rect, Stroke, pos2, vec2};
 
 use super::area::PlotArea;
-use super::ticks::{decimals_of_step, ticks};
+use super::axis::{decimals_of_step, ticks};
 use crate::geometry::seconds_from_ns;
 use crate::gui::theme::{HAIRLINE_WIDTH, Theme, label_font, number_font};
 use crate::gui::units::fixed;

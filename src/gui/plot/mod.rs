@@ -4,20 +4,21 @@
 
 mod area;
 mod axes;
+mod axis;
 mod curve;
 mod navigate;
 mod on_screen;
 mod readout;
 mod run_legend;
-mod ticks;
 mod value_axis;
+mod value_plot;
 
 use egui::containers::scroll_area::ScrollAreaOutput;
-use egui::epaint::{Mesh, Vertex, WHITE_UV};
 use egui::{Color32, Painter, Pos2, Rect, Response, Shape, Stroke, Ui, pos2};
 
 pub(crate) use area::{PlotArea, visible_segments};
 pub(crate) use axes::{TICKS_ONLY, TIME_GUTTER, VALUE_GUTTER, paint_time_axis, paint_value_axis, within_gutters};
+pub(crate) use axis::{ValueAxis, decimals_of_step, ticks};
 pub(crate) use curve::{BandCurve, Curve, StateCurve};
 pub(crate) use navigate::{Clicks, Interaction, Wheel, navigate, visible_range, zoom_about_cursor};
 pub(crate) use on_screen::{PlotOnScreen, plot_under_pointer, register};
@@ -25,8 +26,8 @@ pub(crate) use readout::{
     ReadLine, Readout, is_named_within, paint_time_labels, paint_times, paint_values, read_lines,
 };
 pub(crate) use run_legend::run_legend_ui;
-pub(crate) use ticks::{decimals_of_step, ticks};
 pub(crate) use value_axis::value_range_of;
+pub(crate) use value_plot::{GridLine, ValuePlot, paint_between};
 
 use self::readout::paint_readout;
 use self::value_axis::value_axis_ui;
@@ -129,18 +130,9 @@ pub(crate) fn paint_line(painter: &Painter, points: &[Pos2], style: RunStyle, wi
 
 pub(crate) fn paint_band(painter: &Painter, area: &PlotArea, band: &BandCurve, fill: Color32) {
     for segment in &band.segments {
-        let mut mesh = Mesh::default();
-        for (offset, low, high) in segment {
-            for value in [*low, *high] {
-                let pos = pos2(area.rect.left() + offset, area.y(value));
-                mesh.vertices.push(Vertex { pos, uv: WHITE_UV, color: fill });
-            }
-        }
-        for corner in (2..mesh.vertices.len() as u32).step_by(2) {
-            mesh.add_triangle(corner - 2, corner - 1, corner);
-            mesh.add_triangle(corner - 1, corner, corner + 1);
-        }
-        painter.add(Shape::mesh(mesh));
+        let at = |offset: f32, value: f64| pos2(area.rect.left() + offset, area.y(value));
+        let pairs = segment.iter().map(|(offset, low, high)| [at(*offset, *low), at(*offset, *high)]);
+        paint_between(painter, pairs, fill);
     }
 }
 

@@ -6,7 +6,7 @@ use egui::{Align2, Color32, Painter, Pos2, Rangef, Rect, Shape, Stroke, StrokeKi
 
 use super::area::PlotArea;
 use super::axes::{TIME_GUTTER, VALUE_GUTTER};
-use super::ticks::decimals_of_step;
+use super::axis::decimals_of_step;
 use crate::gui::PanelContext;
 use crate::gui::events::look_of;
 use crate::gui::reading::{EventLineKind, ReadingCursor};

@@ -1,11 +1,11 @@
 //! Singular values on a logarithmic axis with both thresholds.
 
-use egui::{Align2, Rect, Role, Sense, Stroke, StrokeKind, Ui, WidgetInfo, pos2, vec2};
+use egui::{Rect, Role, Sense, Stroke, StrokeKind, Ui, WidgetInfo, pos2, vec2};
 
 use crate::gimbal::ParameterNames;
 use crate::gui::accessible::describe;
-use crate::gui::plot::paint_ground;
-use crate::gui::theme::{Theme, label_font, number_font};
+use crate::gui::plot::{GridLine, ValueAxis, ValuePlot, paint_ground};
+use crate::gui::theme::{Theme, label_font};
 use crate::gui::units::significant;
 use crate::observability::{RankReport, parameters_of};
 
@@ -28,22 +28,15 @@ pub(super) fn paint(
     let painter = ui.painter_at(rect);
     paint_ground(&painter, theme, rect);
     let plot = Rect::from_min_max(rect.min + vec2(36.0, 3.0), rect.max - vec2(4.0, 3.0));
-    let Some(axis) = LogAxis::of(peers, plot).filter(|_| !rank.singular_values.is_empty()) else { return };
+    let Some(y) = axis_of(peers).filter(|_| !rank.singular_values.is_empty()) else { return };
+    let x = ValueAxis { logarithmic: false, low: -0.5, high: rank.singular_values.len() as f64 - 0.5 };
+    let axes = ValuePlot { rect: plot, x, y };
+    // Every third power of ten has a grid line.
+    let powers = y.decades().filter(|(power, digit)| *digit == 1.0 && power.rem_euclid(3) == 0);
+    let line = |(power, _)| GridLine { value: 10_f64.powi(power), color: theme.grid, label: format!("1e{power}") };
+    axes.paint_rows(&painter, theme, 3.0, powers.map(line));
 
-    // Grid lines at thirds of decades, with powers of ten as labels.
-    let font = number_font();
-    for decade in (axis.low.ceil() as i32..=axis.high.floor() as i32).filter(|decade| decade.rem_euclid(3) == 0) {
-        let y = axis.y_of_power(f64::from(decade));
-        painter.hline(plot.x_range(), y, Stroke::new(1.0, theme.grid));
-        painter.text(
-            pos2(plot.left() - 3.0, y),
-            Align2::RIGHT_CENTER,
-            format!("1e{decade}"),
-            font.clone(),
-            theme.text_weak,
-        );
-    }
-
+    let y_of = |value: f64| axes.at_or_edge(0.0, value).y.min(plot.bottom());
     let pitch = plot.width() / rank.singular_values.len() as f32;
     let width = (pitch * 0.62).clamp(2.0, 22.0);
     for (index, value) in rank.singular_values.iter().enumerate() {
@@ -55,7 +48,7 @@ pub(super) fn paint(
         } else {
             theme.ok
         };
-        let bar = Rect::from_min_max(pos2(x - width / 2.0, axis.y(*value)), pos2(x + width / 2.0, plot.bottom()));
+        let bar = Rect::from_min_max(pos2(x - width / 2.0, y_of(*value)), pos2(x + width / 2.0, plot.bottom()));
         if *value <= rank.structural_threshold {
             // A zero has no position on the axis; an open box at the bottom represents it.
             let zero = Rect::from_min_max(pos2(bar.left(), plot.bottom() - 5.0), bar.max);
@@ -64,11 +57,11 @@ pub(super) fn paint(
             painter.rect_filled(bar, 0.0, color.gamma_multiply(0.85));
         }
         if let Some(with_priors) = rank.singular_values_with_priors.get(index) {
-            painter.hline(bar.x_range().expand(1.0), axis.y(*with_priors), Stroke::new(1.5, theme.text));
+            painter.hline(bar.x_range().expand(1.0), y_of(*with_priors), Stroke::new(1.5, theme.text));
         }
     }
-    threshold(&painter, theme, plot, axis.y(rank.informed_threshold), "informed");
-    threshold(&painter, theme, plot, axis.y(rank.structural_threshold), "structural");
+    threshold(&painter, theme, plot, y_of(rank.informed_threshold), "informed");
+    threshold(&painter, theme, plot, y_of(rank.structural_threshold), "structural");
 
     let response = ui.interact(rect, ui.unique_id().with(("spectrum", number)), Sense::hover());
     response.widget_info(|| WidgetInfo::labeled(Role::Image, true, "Singular values"));
@@ -101,34 +94,16 @@ fn threshold(painter: &egui::Painter, theme: &Theme, plot: Rect, y: f32, name: &
     painter.galley(place, galley, theme.text_strong);
 }
 
-/// A vertical logarithmic axis.
-struct LogAxis {
-    plot: Rect,
-    low: f64,
-    high: f64,
-}
-
-impl LogAxis {
-    /// Axis that contains the spectra of all reports.
-    fn of(reports: &[&RankReport], plot: Rect) -> Option<Self> {
-        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        for rank in reports.iter().filter(|rank| !rank.singular_values.is_empty()) {
-            let largest = rank.singular_values.iter().chain(&rank.singular_values_with_priors).copied();
-            let largest = largest.filter(|value| value.is_finite()).fold(rank.informed_threshold, f64::max);
-            let smallest = if rank.structural_threshold > 0.0 { rank.structural_threshold } else { largest * 1e-12 };
-            (low, high) = (low.min(smallest.log10() - 1.2), high.max(largest.log10() + 0.6));
-        }
-        (low.is_finite() && high.is_finite() && low < high).then_some(Self { plot, low, high })
+/// Logarithmic axis that contains the spectra of all reports.
+fn axis_of(reports: &[&RankReport]) -> Option<ValueAxis> {
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    for rank in reports.iter().filter(|rank| !rank.singular_values.is_empty()) {
+        let largest = rank.singular_values.iter().chain(&rank.singular_values_with_priors).copied();
+        let largest = largest.filter(|value| value.is_finite()).fold(rank.informed_threshold, f64::max);
+        let smallest = if rank.structural_threshold > 0.0 { rank.structural_threshold } else { largest * 1e-12 };
+        (low, high) = (low.min(smallest * 10_f64.powf(-1.2)), high.max(largest * 10_f64.powf(0.6)));
     }
-
-    fn y_of_power(&self, power: f64) -> f32 {
-        let fraction = ((power - self.low) / (self.high - self.low)).clamp(0.0, 1.0);
-        self.plot.bottom() - fraction as f32 * self.plot.height()
-    }
-
-    fn y(&self, value: f64) -> f32 {
-        if value > 0.0 { self.y_of_power(value.log10()) } else { self.plot.bottom() }
-    }
+    (low > 0.0 && low < high && high.is_finite()).then_some(ValueAxis { logarithmic: true, low, high })
 }
 
 /// Both ranks in words.

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use egui::{Align2, Color32, Mesh, Painter, Rect, RichText, Role, Sense, Shape, Stroke, Ui, WidgetInfo, pos2, vec2};
+use egui::{Align2, Color32, Painter, Rect, RichText, Role, Sense, Shape, Stroke, Ui, WidgetInfo, pos2, vec2};
 use nalgebra::Vector2;
 
 use super::histogram::round_up;
@@ -10,8 +10,8 @@ use crate::gui::PanelContext;
 use crate::gui::accessible::describe;
 use crate::gui::help::terms::window;
 use crate::gui::plot::{
-    PlotArea, TIME_GUTTER, decimals_of_step, paint_ground, paint_hatch, paint_line, paint_value_axis, ticks,
-    within_gutters,
+    PlotArea, TIME_GUTTER, decimals_of_step, paint_between, paint_ground, paint_hatch, paint_line, paint_value_axis,
+    ticks, within_gutters,
 };
 use crate::gui::theme::{CURVE_WIDTH, RunStyle, Theme, label_font, mix, number_font};
 use crate::gui::units::{counted, fixed};
@@ -314,18 +314,10 @@ impl Profile<'_> {
         }
         painter.hline(plot.x_range(), area.y(0.0), Stroke::new(1.0, theme.text_weak));
         let inner = painter.with_clip_rect(plot.intersect(painter.clip_rect()));
-        let mut band = Mesh::default();
-        for (fraction, mean) in &flight {
-            for side in [-2.0, 2.0] {
-                let at = pos2(x(*fraction), area.y(mean.mean_px + side * mean.error_px));
-                band.colored_vertex(at, self.style.color.gamma_multiply(0.22));
-            }
-        }
-        for corner in (2..band.vertices.len() as u32).step_by(2) {
-            band.add_triangle(corner - 2, corner - 1, corner);
-            band.add_triangle(corner - 1, corner, corner + 1);
-        }
-        inner.add(Shape::mesh(band));
+        let band = flight.iter().map(|(fraction, mean)| {
+            [-2.0, 2.0].map(|side| pos2(x(*fraction), area.y(mean.mean_px + side * mean.error_px)))
+        });
+        paint_between(&inner, band, self.style.color.gamma_multiply(0.22));
         let line = |means: &[(f64, MeanResidual)]| -> Vec<egui::Pos2> {
             means.iter().map(|(fraction, mean)| pos2(x(*fraction), area.y(mean.mean_px))).collect()
         };

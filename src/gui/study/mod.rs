@@ -7,6 +7,7 @@ mod context;
 mod csv;
 mod model;
 mod parallel;
+mod parallel_axes;
 mod parameters;
 mod plots;
 mod points;

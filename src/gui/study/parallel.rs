@@ -8,10 +8,11 @@ use egui::epaint::{Mesh, Vertex, WHITE_UV};
 use egui::{Align2, Color32, PopupCloseBehavior, Pos2, Rect, Role, Sense, Shape, Stroke, Ui, WidgetInfo, pos2, vec2};
 
 use super::context::StudyContext;
+use super::parallel_axes::{AxisScale, ParallelAxis, default_axes, parallel_axis};
 use crate::gui::accessible::describe;
 use crate::gui::theme::{Theme, ThemeName, label_font, number_font, viridis};
 use crate::gui::units::significant;
-use crate::study::view::{AxisScale, ParallelAxis, Study, default_axes, parallel_axis};
+use crate::study::view::Study;
 
 /// Distance in points within which the pointer hits a line.
 const REACH: f32 = 5.0;

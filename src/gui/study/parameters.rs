@@ -5,9 +5,10 @@ use egui::{Align2, Rect, RichText, Role, ScrollArea, Sense, Stroke, Ui, WidgetIn
 use super::context::StudyContext;
 use super::points::Points;
 use crate::gui::accessible::describe;
-use crate::gui::theme::{ThemeName, label_font, number_font};
+use crate::gui::plot::{GridLine, ValueAxis, ValuePlot};
+use crate::gui::theme::{ThemeName, label_font};
 use crate::gui::units::{fixed, significant};
-use crate::study::view::{ParameterErrors, SigmaVerdict, Study, ValueAxis, parameter_errors};
+use crate::study::view::{ParameterErrors, SigmaVerdict, Study, parameter_errors};
 
 /// Headings of the table with their definitions.
 const HEADS: [(&str, &str); 7] = [
@@ -118,26 +119,14 @@ impl ParametersPanel {
         let plot = Rect::from_min_max(rect.min + vec2(LEFT, 4.0), rect.max - vec2(4.0, BELOW));
         let painter = ui.painter_at(rect);
         painter.rect_filled(plot, 0.0, theme.plot_background);
-        let [x_axis, y_axis] = axes(of);
-        let place = |sigma: f64, error: f64| {
-            let x = plot.left() + x_axis.position(sigma) as f32 * plot.width();
-            pos2(x, plot.bottom() - y_axis.position(error) as f32 * plot.height())
-        };
-        for mark in x_axis.marks((plot.width() / 50.0) as usize) {
-            let x = place(mark, y_axis.low).x;
-            painter.vline(x, plot.y_range(), Stroke::new(1.0, theme.grid));
-            let at = pos2(x, plot.bottom() + 2.0);
-            painter.text(at, Align2::CENTER_TOP, significant(mark), number_font(), theme.text_weak);
-        }
-        for mark in y_axis.marks((plot.height() / 24.0) as usize) {
-            let y = place(x_axis.low, mark).y;
-            painter.hline(plot.x_range(), y, Stroke::new(1.0, theme.grid));
-            let at = pos2(plot.left() - 3.0, y);
-            painter.text(at, Align2::RIGHT_CENTER, significant(mark), number_font(), theme.text_weak);
-        }
+        let [x, y] = axes(of);
+        let axes = ValuePlot { rect: plot, x, y };
+        let line = |value| GridLine { value, color: theme.grid, label: significant(value) };
+        axes.paint_columns(&painter, &theme, 2.0, x.marks((plot.width() / 50.0) as usize).into_iter().map(line));
+        axes.paint_rows(&painter, &theme, 3.0, y.marks((plot.height() / 24.0) as usize).into_iter().map(line));
         let lines = painter.with_clip_rect(plot.intersect(painter.clip_rect()));
         for (factor, name) in [(1.0, "1σ"), (3.0, "3σ")] {
-            let line = factor_line(factor, [x_axis, y_axis], plot);
+            let line = [x.low, x.high].map(|sigma| axes.at(sigma, factor * sigma));
             lines.add(egui::Shape::dashed_line(&line, Stroke::new(1.5, theme.ground_truth), 6.0, 4.0));
             let along = line[1] + (line[0] - line[1]) * 0.06 + vec2(-4.0, -2.0);
             let inside = pos2(along.x, along.y.max(plot.top() + LABEL_HEIGHT));
@@ -146,7 +135,8 @@ impl ParametersPanel {
         let key = Key { generation: ctx.model.generation, chosen, rect, theme: theme.name };
         if self.key != Some(key) {
             self.key = Some(key);
-            let places = of.points.iter().map(|point| (place(point.sigma, point.error.abs()), point.row)).collect();
+            let place = |sigma, error: f64| axes.at_or_edge(sigma, error.abs());
+            let places = of.points.iter().map(|point| (place(point.sigma, point.error), point.row)).collect();
             self.points = Points::new(places, theme.run(0).color.gamma_multiply(0.7));
         }
         self.points.paint(&painter);
@@ -195,13 +185,4 @@ fn axes(of: &ParameterErrors) -> [ValueAxis; 2] {
     let highest = most(&mut errors()).max(3.0 * high);
     let lowest = least(&mut errors().filter(|error| *error > 0.0)).clamp(1e-3 * low, low);
     [ValueAxis::logarithmic(low, high), ValueAxis::logarithmic(lowest, highest)]
-}
-
-/// Line on which the error is a multiple of σ, from the left to the right edge of the plot.
-fn factor_line(factor: f64, [x_axis, y_axis]: [ValueAxis; 2], plot: Rect) -> [egui::Pos2; 2] {
-    let (low, high) = (y_axis.low.ln(), y_axis.high.ln());
-    [(x_axis.low, plot.left()), (x_axis.high, plot.right())].map(|(sigma, x)| {
-        let position = ((factor * sigma).ln() - low) / (high - low);
-        pos2(x, plot.bottom() - position as f32 * plot.height())
-    })
 }

@@ -7,8 +7,9 @@ use egui::{Label, RichText, Ui};
 use super::context::StudyContext;
 use super::model::{StudyModel, shown_group};
 use super::strips::{StripPlot, StripsFrame, StripsPlot};
+use crate::gui::plot::ValueAxis;
 use crate::gui::units::{counted, fixed, significant};
-use crate::study::view::{Metric, Spread, Study, SuccessRate, ValueAxis, columns, paired_differences, success_rate};
+use crate::study::view::{Metric, Spread, Study, SuccessRate, columns, paired_differences, success_rate};
 
 /// Strips that are recomputed when rows, groups or metric change.
 #[derive(Debug, Default)]

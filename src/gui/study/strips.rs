@@ -5,9 +5,10 @@ use egui::{Align2, Painter, Pos2, Rect, Role, ScrollArea, Sense, Stroke, Ui, Wid
 use super::context::StudyContext;
 use super::points::Points;
 use crate::gui::accessible::describe;
+use crate::gui::plot::ValueAxis;
 use crate::gui::theme::{Theme, label_font, number_font};
 use crate::gui::units::significant;
-use crate::study::view::{Spread, ValueAxis};
+use crate::study::view::Spread;
 
 /// Minimum and maximum height of a strip in points.
 const STRIP: [f32; 2] = [26.0, 120.0];

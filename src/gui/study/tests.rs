@@ -1,19 +1,22 @@
 //! Tests of the view of a synthetic study: found by label, clicked, and drawn in every theme.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use egui::{Event, Modifiers, PointerButton, Pos2, Rect, pos2, vec2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 
+use super::parallel_axes::{default_axes, parallel_axis};
 use super::strips::swarm;
 use super::{StudyOptions, StudyPanel, StudyRequest, StudyState, study_panel_ui, study_ui};
 use crate::gui::Presentation;
+use crate::gui::plot::ValueAxis;
 use crate::gui::rendering::headless::{Headless, HeadlessOptions, draw};
 use crate::gui::tests::keep_screenshot;
 use crate::gui::theme::{Theme, ThemeName};
-use crate::study::view::tests::synthetic_study;
-use crate::study::view::{Study, ValueAxis};
+use crate::study::view::Study;
+use crate::study::view::tests::{LOGS, synthetic_study};
 use crate::text::Named as _;
 
 fn state(seeds: usize, options: &StudyOptions) -> StudyState {
@@ -197,4 +200,20 @@ fn unknown_columns_of_options_are_reported() {
         "unknown reference group 'best': expected one of auto",
     );
     check(StudyOptions { filter: "ate < 1".to_owned(), ..StudyOptions::default() }, "no column 'ate'");
+}
+
+#[test]
+fn parallel_axes_place_names_and_numbers() {
+    let study = synthetic_study(1);
+    let names = default_axes(&study.runs);
+    assert_eq!(names, ["run", "log", "perturbation", "ate_rmse_m", "pose_nees", "chain_error_m", "rank_informed"]);
+    let rows: Vec<usize> = (0..study.runs.rows()).collect();
+    for name in &names {
+        let axis = parallel_axis(&study.runs, name, &rows).unwrap();
+        assert_eq!(axis.positions.len(), rows.len());
+        assert!(axis.positions.iter().flatten().all(|position| (0.0..=1.0).contains(position)), "{name}");
+    }
+    assert!(parallel_axis(&study.runs, "key", &rows).is_none(), "too many names");
+    let axis = parallel_axis(&study.runs, "log", &rows).unwrap();
+    assert_eq!(axis.positions.iter().map(|it| format!("{it:?}")).collect::<BTreeSet<_>>().len(), LOGS.len());
 }

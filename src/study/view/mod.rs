@@ -4,10 +4,9 @@
 //! - `study`: the tables of one study, and the names of the columns that the view relies on.
 //! - `filter`: conditions on rows, `ate_rmse_m < 0.1 and run = auto`.
 //! - `arrange`: rows that pass, their order and their groups.
-//! - `metric`: numeric columns with the shown unit; ranges of values and axes.
+//! - `metric`: numeric columns with the shown unit.
 //! - `spread`, `success`, `paired`: quantiles, Wilson intervals, differences between groups on equal inputs.
 //! - `summary`: statistics of the groups.
-//! - `parallel`: rows as lines over several axes.
 //! - `parameters`: errors of calibration parameters against their σ.
 //! - `comparable`: the runs that are opened together with a run.
 
@@ -16,7 +15,6 @@ mod comparable;
 mod filter;
 mod metric;
 mod paired;
-mod parallel;
 mod parameters;
 mod spread;
 mod study;
@@ -28,9 +26,8 @@ pub(crate) mod tests;
 pub use arrange::{Arranged, RowGroup, SortKey, arrange, group_columns};
 pub use comparable::comparable_rows;
 pub use filter::RowFilter;
-pub use metric::{Metric, ValueAxis, metrics};
+pub use metric::{Metric, metrics};
 pub use paired::{GroupDifference, PairedDifference, paired_differences};
-pub use parallel::{AxisScale, ParallelAxis, default_axes, parallel_axis};
 pub use parameters::{ParameterErrors, ParameterPoint, SigmaVerdict, parameter_errors};
 pub use spread::Spread;
 pub use study::{Study, columns};

@@ -6,7 +6,7 @@ use super::*;
 use crate::geometry::SplitMix64;
 use crate::study::{Cell, ColumnType, StudyColumn, StudyTable};
 
-const LOGS: [&str; 8] = ["house", "city", "yard", "forest", "bridge", "hall", "field", "ridge"];
+pub(crate) const LOGS: [&str; 8] = ["house", "city", "yard", "forest", "bridge", "hall", "field", "ridge"];
 const RUNS: [&str; 5] = ["auto", "minimal-swapped", "classical", "auto:encoder=off", "static"];
 const PERTURBATIONS: [&str; 5] = ["none", "mount-1deg", "mount-3deg", "noise-x2", "offset-5ms"];
 const PARAMETERS: [(&str, &str, f64); 6] = [
@@ -297,45 +297,6 @@ fn parameter_errors_show_a_sigma_that_is_too_small() {
     assert_eq!((found[0].unit, found[1].unit, found[5].unit), ("°", "mm", "ms"));
     assert!((found[1].sigma_median - 1.0).abs() < 0.1, "millimetres: {}", found[1].sigma_median);
     assert!(parameter_errors(&study, &study.run_of_parameter_rows(), &[]).is_empty());
-}
-
-#[test]
-fn axes_show_all_values_and_round_marks() {
-    let check = |values: &[f64], logarithmic: bool| {
-        let axis = ValueAxis::over(values.iter().copied());
-        assert_eq!(axis.logarithmic, logarithmic, "{values:?}");
-        for value in values {
-            assert!((0.0..=1.0).contains(&axis.position(*value)), "{value} on {axis:?}");
-        }
-        let marks = axis.marks(6);
-        assert!(!marks.is_empty() && marks.len() <= 14, "{marks:?}");
-        assert!(marks.iter().all(|mark| (-0.001..=1.001).contains(&axis.position(*mark))), "{marks:?} on {axis:?}");
-    };
-    check(&[0.01, 0.02, 0.03], false);
-    check(&[0.01, 0.02, 3.0], true);
-    check(&[-1.0, 0.0, 100.0], false);
-    check(&[5.0, 5.0], false);
-    check(&[0.0], false);
-    check(&[1e-9, 1e-9, 1e6], true);
-    assert_eq!(ValueAxis::over([0.2, 1.0].into_iter()).low, 0.0, "zero is near");
-    let axis = ValueAxis::around_zero([0.5, 2.0].into_iter());
-    assert!(axis.low < 0.0 && axis.position(0.0) > 0.0);
-}
-
-#[test]
-fn parallel_axes_place_names_and_numbers() {
-    let study = synthetic_study(1);
-    let names = default_axes(&study.runs);
-    assert_eq!(names, ["run", "log", "perturbation", "ate_rmse_m", "pose_nees", "chain_error_m", "rank_informed"]);
-    let rows: Vec<usize> = (0..study.runs.rows()).collect();
-    for name in &names {
-        let axis = parallel_axis(&study.runs, name, &rows).unwrap();
-        assert_eq!(axis.positions.len(), rows.len());
-        assert!(axis.positions.iter().flatten().all(|position| (0.0..=1.0).contains(position)), "{name}");
-    }
-    assert!(parallel_axis(&study.runs, "key", &rows).is_none(), "too many names");
-    let axis = parallel_axis(&study.runs, "log", &rows).unwrap();
-    assert_eq!(axis.positions.iter().map(|it| format!("{it:?}")).collect::<BTreeSet<_>>().len(), LOGS.len());
 }
 
 #[test]

@@ -1,12 +1,11 @@
 //! Rows as lines over parallel axes.
 
-use super::arrange::group_columns;
-use super::metric::{Metric, ValueAxis, metrics};
-use super::study::columns;
+use crate::gui::plot::ValueAxis;
+use crate::study::view::{Metric, columns, group_columns, metrics};
 use crate::study::{ColumnType, StudyTable};
 
 #[derive(Clone, Debug, PartialEq)]
-pub enum AxisScale {
+pub(super) enum AxisScale {
     /// A numeric scale.
     Values(ValueAxis),
     /// Texts in this order from below, at equal distances.
@@ -15,20 +14,20 @@ pub enum AxisScale {
 
 /// One axis with the positions of rows on it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct ParallelAxis {
-    pub column: String,
+pub(super) struct ParallelAxis {
+    pub(super) column: String,
     /// Title of the axis, with the shown unit.
-    pub title: String,
-    pub scale: AxisScale,
+    pub(super) title: String,
+    pub(super) scale: AxisScale,
     /// Position of each requested row, from 0 (bottom) to 1; `None` for an empty cell.
-    pub positions: Vec<Option<f64>>,
+    pub(super) positions: Vec<Option<f64>>,
 }
 
 /// Maximum number of texts on an axis; with more, the names are illegible.
 const MAX_NAMES: usize = 40;
 
 /// The axis of a column with the positions of `rows`; `None` for an unknown column or too many different texts.
-pub fn parallel_axis(table: &StudyTable, column: &str, rows: &[usize]) -> Option<ParallelAxis> {
+pub(super) fn parallel_axis(table: &StudyTable, column: &str, rows: &[usize]) -> Option<ParallelAxis> {
     let found = table.column(column)?;
     if matches!(found.values.column_type(), ColumnType::Text | ColumnType::Bool) || column == columns::SEED {
         let texts: Vec<Option<String>> = rows
@@ -65,7 +64,7 @@ fn natural(text: &str) -> (Option<i64>, &str) {
 }
 
 /// The initial axes: inputs that vary, then the most important results that have values.
-pub fn default_axes(table: &StudyTable) -> Vec<String> {
+pub(super) fn default_axes(table: &StudyTable) -> Vec<String> {
     const INPUTS: [&str; 4] = [columns::RUN, columns::LOG, columns::DISTURBANCE, columns::PERTURBATION];
     const RESULTS: [&str; 6] =
         [columns::ATE, "rpe_10m_translation_m", "pose_nees", "chain_error_m", "reprojection_rms_px", "rank_informed"];
