@@ -165,18 +165,17 @@ impl<L: Language> Parser<'_, L> {
     }
 
     fn alternatives(&mut self) -> Result<Expression<L>> {
-        self.joined(&Token::Or, Self::conjunction, Predicate::Or)
+        self.joined(&Token::Or, Self::conjunction)
     }
 
     fn conjunction(&mut self) -> Result<Expression<L>> {
-        self.joined(&Token::And, Self::negation, Predicate::And)
+        self.joined(&Token::And, Self::negation)
     }
 
     fn joined(
         &mut self,
         operator: &Token,
         expression: fn(&mut Self) -> Result<Expression<L>>,
-        join: fn(Box<Condition<L>>, Box<Condition<L>>) -> Condition<L>,
     ) -> Result<Expression<L>> {
         let begin = self.begin();
         let mut left = expression(self)?;
@@ -185,7 +184,11 @@ impl<L: Language> Parser<'_, L> {
             let right_begin = self.begin();
             let right = expression(self)?;
             let (first, second) = (self.predicate(left, begin)?, self.predicate(right, right_begin)?);
-            left = Expression::Predicate(join(Box::new(first), Box::new(second)));
+            let (first, second) = (Box::new(first), Box::new(second));
+            left = Expression::Predicate(match operator {
+                Token::Or => Predicate::Or(first, second),
+                _ => Predicate::And(first, second),
+            });
         }
         Ok(left)
     }
