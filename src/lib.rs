@@ -12,7 +12,8 @@
 //! | [`gimbal`] | the actuated chain in each parameterization, its Jacobians, conversions and singularity margins | measurements |
 //! | [`sensors`] | plain types of sensor measurements and of the rig that describes the sensors | the source of the data |
 //! | [`optimization`] | robust loss, reprojection residual with its Jacobians, elimination of landmarks, damped solver | the meaning of the unknowns |
-//! | `flight_log` | MCAP in and out as typed events in time order; rig files; logs of other recorders | the use of the events |
+//! | `files` | files that are no logs: rigs, stills, robot descriptions, tables; atomic output and limits of what is read | logs |
+//! | `flight_log` | MCAP in and out as typed events in time order; the rig of a log; logs of other recorders | the use of the events |
 //! | [`frontend`] | image in, feature tracks out | the estimator, so that runs share tracks |
 //! | [`simulation`] | a synthetic flight with ground truth, as tracks or written as a flight log | the estimator |
 //! | [`estimator`] | window state, residuals, solver, marginalization; each step returns a `StepReport` | logs, screens, the wall clock |
@@ -33,8 +34,8 @@
 //! its flight.
 //!
 //! Four absences hold the shape: nothing above `gui` names egui or wgpu; [`frontend`], [`estimator`] and [`calibration`]
-//! do not know `flight_log`; [`frontend`] does not know the estimator; only `flight_log`, `export` and what
-//! follows it touch the file system, and only `gui` asks the wall clock for anything but the stage timings of a report.
+//! do not know `flight_log`; [`frontend`] does not know the estimator; only `files`, `flight_log`, `export` and
+//! what follows it touch the file system, and only `gui` asks the wall clock for anything but the stage timings of a report.
 //!
 //! Equations and parameterizations: docs/mathematics.md, sections 2 and 3; rank rule: docs/mathematics.md, section 8.
 //!
@@ -92,6 +93,8 @@ pub mod desktop;
 pub mod estimator;
 #[cfg(feature = "logs")]
 pub mod export;
+#[cfg(feature = "logs")]
+pub mod files;
 #[cfg(feature = "logs")]
 pub mod flight_log;
 pub mod frontend;

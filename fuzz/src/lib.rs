@@ -9,11 +9,11 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, LazyLock};
 
 use dcvins::export::{self, EvaluationOptions};
+use dcvins::files::stills::{read_stills, read_stills_chain};
+use dcvins::files::urdf::{CameraAxes, RobotModel};
 use dcvins::flight_log::convert::convert;
-use dcvins::flight_log::urdf::{CameraAxes, RobotModel};
 use dcvins::flight_log::{
     FlightLog, FrameStream, ImageReader, LogWriter, LogWriterOptions, MessageKind, MessageTimes, MessageType,
-    read_stills, read_stills_chain,
 };
 use dcvins::log_check;
 use dcvins::sensors::Rig;

@@ -1,4 +1,6 @@
-//! The arguments of the program: its sub-commands.
+//! The arguments of the program: its sub-commands and its version.
+
+use std::sync::LazyLock;
 
 use clap::{Parser, Subcommand};
 
@@ -21,7 +23,6 @@ use crate::cli::run::RunArguments;
 use crate::cli::screenshot::ScreenshotArguments;
 use crate::cli::simulate::SimulateArguments;
 use crate::cli::sweep::{SweepArguments, SweepJobArguments};
-use crate::cli::version::version;
 use crate::cli::view::ViewArguments;
 
 /// Debugger for visual-inertial navigation with a camera on a gimbal.
@@ -93,4 +94,34 @@ pub(crate) enum Command {
     /// Print shell completions or write manual pages, for packages.
     #[command(hide = true)]
     Generate(GenerateArguments),
+}
+
+/// Commit of the build, by the environment variable `DCVINS_COMMIT`; the scripts of the packages set it.
+const COMMIT: Option<&str> = option_env!("DCVINS_COMMIT");
+
+static VERSION: LazyLock<String> = LazyLock::new(|| described(COMMIT));
+
+/// Text of `--version` behind the name of the program, such as `0.2.0 (618ee816)`.
+pub(crate) fn version() -> &'static str {
+    &VERSION
+}
+
+fn described(commit: Option<&str>) -> String {
+    let number = env!("CARGO_PKG_VERSION");
+    match commit.filter(|commit| !commit.is_empty()) {
+        Some(commit) => format!("{number} ({commit})"),
+        None => number.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::described;
+
+    #[test]
+    fn a_build_without_a_commit_has_the_number_alone() {
+        assert_eq!(described(None), env!("CARGO_PKG_VERSION"));
+        assert_eq!(described(Some("")), env!("CARGO_PKG_VERSION"));
+        assert!(described(Some("618ee816")).ends_with(" (618ee816)"));
+    }
 }

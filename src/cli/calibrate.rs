@@ -11,12 +11,10 @@ use dcvins::session::{self, CalibrationRequest, CalibrationRun, CalibrationRunEr
 
 use crate::cli::exit::ExitOutcome;
 use crate::cli::interrupt::Interrupt;
-use crate::cli::limit_arguments::LimitArguments;
 use crate::cli::prepared_log::prepare;
-use crate::cli::prior_arguments::PriorArguments;
+use crate::cli::shared_arguments::{LimitArguments, PriorArguments, seconds};
 use crate::cli::stills_arguments::StillsArguments;
 use crate::cli::terminal::{Progress, notify, print, print_json};
-use crate::cli::value_parsers::seconds;
 
 #[derive(Args, Clone, Debug)]
 pub(crate) struct CalibrateArguments {

@@ -12,8 +12,8 @@ use dcvins::sensors::Rig;
 
 use crate::cli::exit::ExitOutcome;
 use crate::cli::interrupt::Interrupt;
-use crate::cli::limit_arguments::LimitArguments;
 use crate::cli::prepared_log::prepare;
+use crate::cli::shared_arguments::LimitArguments;
 use crate::cli::terminal::{Progress, notify, print_report};
 
 #[derive(Args, Clone, Debug)]

@@ -8,9 +8,7 @@ use dcvins::sensors::LeverArm;
 use dcvins::session::{ParameterizationChoice, RunSpec, SessionRequest, TrajectorySource, TrajectorySpec};
 use dcvins::text::{Named as _, key_list};
 
-use crate::cli::limit_arguments::LimitArguments;
-use crate::cli::prior_arguments::PriorArguments;
-use crate::cli::value_parsers::seconds;
+use crate::cli::shared_arguments::{LimitArguments, PriorArguments, seconds};
 
 /// Runs, rig, ground truth and time range, shared by the sub-commands that run the estimator.
 #[derive(Args, Clone, Debug, Default)]

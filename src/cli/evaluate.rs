@@ -7,8 +7,8 @@ use clap::{Args, ValueEnum};
 use dcvins::export::{self, EvaluationOptions};
 use dcvins::session::accuracy::{RelativeDelta, TrajectoryAlignment};
 
+use crate::cli::shared_arguments::seconds;
 use crate::cli::terminal::print_report;
-use crate::cli::value_parsers::seconds;
 
 #[derive(Args, Clone, Debug)]
 pub(crate) struct EvaluateArguments {

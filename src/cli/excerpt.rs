@@ -11,10 +11,9 @@ use dcvins::session::{FlightPrior, Recording, RunSpec, SessionPlan, SessionReque
 use crate::cli::compute::compute;
 use crate::cli::exit::ExitOutcome;
 use crate::cli::interrupt::Interrupt;
-use crate::cli::limit_arguments::LimitArguments;
 use crate::cli::prepared_log::prepare;
+use crate::cli::shared_arguments::{LimitArguments, seconds};
 use crate::cli::terminal::{notify, print_report};
-use crate::cli::value_parsers::seconds;
 
 #[derive(Args, Clone, Debug)]
 pub(crate) struct ExcerptArguments {

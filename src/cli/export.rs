@@ -5,20 +5,18 @@ use std::sync::Arc;
 
 use anyhow::Result;
 use clap::{Args, ValueEnum};
-use dcvins::flight_log::urdf::RobotModel;
-use dcvins::flight_log::{FlightLog, log_name};
+use dcvins::files::urdf::RobotModel;
+use dcvins::flight_log::FlightLog;
 use dcvins::interop::{
     Configuration, FixedJointAngles, OtherEstimator, calibrated_description, configure, robot_description,
     write_configuration,
 };
 use dcvins::sensors::{CameraMount, Rig};
-use dcvins::text::{Entry, FINITE, Named as _};
+use dcvins::text::{Entry, FINITE, Named as _, log_name};
 use serde::Serialize;
 
-use crate::cli::limit_arguments::LimitArguments;
-use crate::cli::robot_link_arguments::RobotLinkArguments;
+use crate::cli::shared_arguments::{LimitArguments, RobotLinkArguments, seconds};
 use crate::cli::terminal::{print, print_json};
-use crate::cli::value_parsers::seconds;
 
 #[derive(Args, Clone, Debug)]
 pub(crate) struct ExportArguments {

@@ -10,7 +10,7 @@ use dcvins::gui::window::{FIGURE_FONT_PT, FIGURE_SIDE_MM, FigureSpec};
 use dcvins::session::Recording;
 use dcvins::text::Named as _;
 
-use crate::cli::value_parsers::{seconds, within};
+use crate::cli::shared_arguments::{seconds, within};
 
 /// Width of a figure without --width-mm: the text of an A4 page.
 const DEFAULT_WIDTH_MM: f64 = 175.0;

@@ -6,7 +6,7 @@ use anyhow::{Context as _, Result};
 use clap::{Args, Command, Subcommand};
 use clap_complete::Shell;
 use clap_mangen::Man;
-use dcvins::flight_log::output;
+use dcvins::files::output;
 
 use crate::cli::terminal::print;
 

@@ -16,23 +16,21 @@ mod export;
 mod figure_arguments;
 mod generate;
 mod interrupt;
-mod limit_arguments;
 mod noise;
 #[cfg(feature = "gui")]
 mod open_log;
 mod plan;
 mod prepared_log;
-mod prior_arguments;
 mod report;
 #[cfg(feature = "gui")]
 mod report_figures;
 mod result_cache;
 mod rig;
-mod robot_link_arguments;
 mod run;
 mod run_summary;
 #[cfg(feature = "gui")]
 mod screenshot;
+mod shared_arguments;
 mod simulate;
 mod stills_arguments;
 #[cfg(feature = "gui")]
@@ -41,13 +39,11 @@ mod study_arguments;
 mod study_report;
 mod sweep;
 mod terminal;
-mod value_parsers;
-mod version;
 mod view;
 
 use clap::{CommandFactory as _, Parser as _};
 use dcvins::export::SourceError;
-use dcvins::flight_log::printable_lines;
+use dcvins::text::printable_lines;
 
 use arguments::{Arguments, Command};
 use exit::ExitOutcome;

@@ -14,10 +14,9 @@ use dcvins::session::{self, FlightNoiseError};
 
 use crate::cli::exit::ExitOutcome;
 use crate::cli::interrupt::Interrupt;
-use crate::cli::limit_arguments::LimitArguments;
 use crate::cli::prepared_log::prepare;
+use crate::cli::shared_arguments::{LimitArguments, seconds};
 use crate::cli::terminal::{Progress, notify, print, print_json};
-use crate::cli::value_parsers::seconds;
 
 #[derive(Args, Clone, Debug)]
 pub(crate) struct NoiseArguments {

@@ -8,10 +8,12 @@ use dcvins::export::{
     ConvertedLogs, LogSources, PreparedLog, SourceError, is_session, open_session, prepare_log, prepare_session,
     read_session,
 };
+use dcvins::files::LogLimits;
 use dcvins::flight_log::convert::SourceKind;
-use dcvins::flight_log::{FlightLog, LogError, LogLimits, log_name, missing_sensors, rig_candidates};
+use dcvins::flight_log::{FlightLog, LogError, missing_sensors, rig_candidates};
 use dcvins::gui::app::{OpenFailure, OpenProgress, OpenRequest, OpenedLog, RigQuestion};
 use dcvins::session::{Session, SessionError, SessionPlan, SessionRequest};
+use dcvins::text::log_name;
 
 use crate::cli::estimation_arguments::EstimationArguments;
 use crate::cli::prepared_log::{converted_logs, stage_text};

@@ -17,8 +17,8 @@ use dcvins::session::{self, RunSpec};
 
 use crate::cli::exit::ExitOutcome;
 use crate::cli::interrupt::Interrupt;
+use crate::cli::shared_arguments::within;
 use crate::cli::terminal::{Progress, notify, print_report};
-use crate::cli::value_parsers::within;
 
 const SLOW: EnteredLimits = EnteredLimits::SLOW;
 

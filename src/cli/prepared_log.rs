@@ -7,10 +7,11 @@ use anyhow::Result;
 use dcvins::export::{ConversionStage, ConvertedLogs, LogSources, PreparedLog, SourceError, prepare_log};
 #[cfg(feature = "gui")]
 use dcvins::export::{prepare_session, read_session};
+use dcvins::files::LogLimits;
 use dcvins::flight_log::convert::ConvertError;
-use dcvins::flight_log::{LogLimits, log_name};
 #[cfg(feature = "gui")]
 use dcvins::session::SavedSession;
+use dcvins::text::log_name;
 
 use crate::cli::estimation_arguments::EstimationArguments;
 use crate::cli::interrupt::Interrupt;

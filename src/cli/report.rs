@@ -5,13 +5,12 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use clap::Args;
 use dcvins::export;
-use dcvins::flight_log::log_name;
 use dcvins::log_check::{self, CheckReport};
 use dcvins::report::{ReportFigure, ReportOptions, write_known_report, write_report};
 use dcvins::session::{Computation, SessionPlan, image_rotations};
 #[cfg(feature = "gui")]
 use dcvins::sweep::{OpenedStudy, is_study};
-use dcvins::text::command_line;
+use dcvins::text::{command_line, log_name};
 
 use crate::cli::compute::compute;
 use crate::cli::estimation_arguments::EstimationArguments;
@@ -22,12 +21,12 @@ use crate::cli::prepared_log::prepared_log;
 use crate::cli::report_figures;
 use crate::cli::result_cache::{CacheArguments, CachedResult};
 use crate::cli::run::{interrupted, is_initialized};
+use crate::cli::shared_arguments::seconds;
 #[cfg(feature = "gui")]
 use crate::cli::study_arguments::StudyArguments;
 #[cfg(feature = "gui")]
 use crate::cli::study_report::study_report;
 use crate::cli::terminal::{Progress, notify, print};
-use crate::cli::value_parsers::seconds;
 
 #[derive(Args, Clone, Debug)]
 pub(crate) struct ReportArguments {

@@ -5,19 +5,15 @@ use std::path::PathBuf;
 use anyhow::{Result, bail};
 use clap::{Args, Subcommand};
 use dcvins::export;
+use dcvins::files::urdf::{DescribedChain, RobotModel};
 use dcvins::flight_log::FlightLog;
-use dcvins::flight_log::rig_template::{
-    CameraChoice, DescribedChain, MechanismAxes, PublishedCamera, RigChoices, RigTemplate,
-};
-use dcvins::flight_log::urdf::RobotModel;
+use dcvins::flight_log::rig_template::{CameraChoice, MechanismAxes, PublishedCamera, RigChoices, RigTemplate};
 use dcvins::sensors::BodyAxes;
 use dcvins::text::{Entry, Named as _};
 
 use crate::cli::exit::{self, ExitOutcome};
-use crate::cli::limit_arguments::LimitArguments;
-use crate::cli::robot_link_arguments::RobotLinkArguments;
+use crate::cli::shared_arguments::{LimitArguments, RobotLinkArguments, sides};
 use crate::cli::terminal::print;
-use crate::cli::value_parsers::sides;
 
 #[derive(Args, Clone, Debug)]
 pub(crate) struct RigArguments {

@@ -5,10 +5,10 @@ use std::path::PathBuf;
 use anyhow::{Result, bail};
 use clap::Args;
 use dcvins::export::{self, RunFileOptions};
-use dcvins::flight_log::log_name;
 use dcvins::geometry::seconds_from_ns;
 use dcvins::session::breakpoints::Condition;
 use dcvins::session::{BreakpointHit, Recording, RunRecord, RunSummary, SessionPlan};
+use dcvins::text::log_name;
 
 use crate::cli::compute::{compute, compute_until};
 use crate::cli::estimation_arguments::EstimationArguments;

@@ -9,7 +9,7 @@ use dcvins::export::{
     PANEL_NAMES, Renderer, STUDY_PANEL_NAMES, ScreenshotOptions, check_screenshot, draw_panel, draw_panel_svg,
     figure_bytes, is_session, open_session, panel_csv, png_bytes, read_motion, write_screenshot,
 };
-use dcvins::flight_log::{ImageReader, log_name};
+use dcvins::flight_log::ImageReader;
 use dcvins::geometry::{ns_from_seconds, seconds_from_ns};
 use dcvins::gui::app::PlayingLog;
 use dcvins::gui::theme::ThemeName;
@@ -19,7 +19,7 @@ use dcvins::observability::SlideRequest;
 use dcvins::session::{Computation, Session, SessionPlan};
 use dcvins::simulation::PrescribedMotion;
 use dcvins::sweep::{OpenedStudy, is_study};
-use dcvins::text::Named as _;
+use dcvins::text::{Named as _, log_name};
 
 use crate::cli::compute::compute;
 use crate::cli::estimation_arguments::EstimationArguments;
@@ -29,9 +29,9 @@ use crate::cli::interrupt::Interrupt;
 use crate::cli::prepared_log::{prepared_log, prepared_session};
 use crate::cli::report::own_command_line;
 use crate::cli::result_cache::{CacheArguments, CachedResult};
+use crate::cli::shared_arguments::{seconds, sides};
 use crate::cli::study_arguments::{StudyArguments, StudyPicture, write_study_picture};
 use crate::cli::terminal::{notify, print};
-use crate::cli::value_parsers::{seconds, sides};
 
 #[derive(Args, Clone, Debug)]
 pub(crate) struct ScreenshotArguments {

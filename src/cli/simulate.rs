@@ -11,8 +11,8 @@ use dcvins::text::key_list;
 
 use crate::cli::exit::ExitOutcome;
 use crate::cli::interrupt::Interrupt;
+use crate::cli::shared_arguments::{seconds, sides};
 use crate::cli::terminal::{Progress, notify, print};
-use crate::cli::value_parsers::{seconds, sides};
 
 #[derive(Args, Clone, Debug)]
 pub(crate) struct SimulateArguments {

@@ -6,8 +6,9 @@ use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use dcvins::calibration::stills::{AngleModel, StillsError, StillsOptions, calibrate_stills, judge_stills};
 use dcvins::export::{self, StillsReport};
-use dcvins::flight_log::{log_name, read_stills, read_stills_chain};
+use dcvins::files::stills::{read_stills, read_stills_chain};
 use dcvins::sensors::Stills;
+use dcvins::text::log_name;
 
 use crate::cli::exit::ExitOutcome;
 use crate::cli::interrupt::Interrupt;

@@ -5,7 +5,7 @@ use std::io::{self, Write as _};
 use std::time::Duration;
 
 use anyhow::{Context as _, Result};
-use dcvins::flight_log::{printable, printable_lines};
+use dcvins::text::{printable, printable_lines};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 

@@ -12,7 +12,7 @@ use crate::export::{
     ExportError, is_session, read_motion, write_csv, write_motion, write_new_rig, write_png, write_screenshot,
     write_svg,
 };
-use crate::flight_log::output;
+use crate::files::output;
 use crate::gui::desktop::{Desktop, DrawnFigure, FigureExport, PanelExport, PathEntry, SampleProgress};
 use crate::sensors::Rig;
 use crate::simulation::{MotionSplines, PrescribedMotion};

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use directories::ProjectDirs;
 
-use crate::flight_log::output;
+use crate::files::output;
 
 /// Maximum number of entries.
 const MAX_LOGS: usize = 12;

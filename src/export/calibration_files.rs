@@ -3,12 +3,11 @@
 use std::path::Path;
 
 use super::calibration_report::CalibrationReport;
-use super::covariance::covariance_of_calibration;
 use super::error::ExportError;
 use super::folder_files::{remove_others, write_files};
 use super::masks;
 use super::posterior::{POSTERIOR, posterior_of_calibration};
-use super::trajectory::tum_of_calibration;
+use super::trajectory::{covariance_of_calibration, tum_of_calibration};
 use crate::geometry::Dimension;
 use crate::session::CalibrationRun;
 

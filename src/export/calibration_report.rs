@@ -7,12 +7,11 @@ use serde::Serialize;
 
 use super::posterior::SigmaTable;
 use crate::calibration::{CalibrationOutcome, ExtrinsicsReport, PixelReport, PoseLoopReport, Statistics};
-use crate::flight_log::log_name;
 use crate::geometry::{Dimension, RigidTransform, seconds_from_ns, so3};
 use crate::gimbal::{Chain, Quantity};
 use crate::sensors::Rig;
 use crate::session::{CalibrationErrors, CalibrationRun, FlightSigmas, WarningLine, log_warning_lines};
-use crate::text::Named as _;
+use crate::text::{Named as _, log_name};
 
 /// One parameter before and after the calibration.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -3,6 +3,7 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
+use crate::files::FileError;
 use crate::flight_log::LogError;
 use crate::session::SavedSessionError;
 
@@ -27,13 +28,15 @@ pub enum ExportError {
     Posterior { problem: String, path: PathBuf },
     #[error(transparent)]
     Log(#[from] LogError),
+    #[error(transparent)]
+    File(#[from] FileError),
     /// Two trajectories cannot be compared.
     #[error("{problem}")]
     NotComparable { problem: String },
 }
 
 impl ExportError {
-    /// For `map_err` behind [`OutputSet::commit`](crate::flight_log::output::OutputSet::commit).
+    /// For `map_err` behind [`OutputSet::commit`](crate::files::output::OutputSet::commit).
     pub(crate) fn commit((path, source): (PathBuf, io::Error)) -> Self {
         Self::Write { source, path }
     }

@@ -8,11 +8,13 @@ use serde::Serialize;
 use super::error::ExportError;
 use super::folder_files::write_files;
 use super::masks;
-use crate::flight_log::{FlightLog, LogWriterOptions, log_name, output, write_excerpt};
+use crate::files::output;
+use crate::flight_log::{FlightLog, LogWriterOptions, write_excerpt};
 use crate::geometry::{ns_from_seconds, seconds_from_ns};
 use crate::observability::{UsefulStretch, UsefulStretches};
 use crate::sensors::Rig;
 use crate::session::{CollectedInformation, FlightSigmas};
+use crate::text::log_name;
 
 const INDEX: &str = "excerpt.json";
 /// Largest growth of σ that still counts as the result of the whole flight.

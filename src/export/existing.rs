@@ -15,8 +15,9 @@ use super::error::ExportError;
 use super::masks::is_mask_name;
 use super::posterior::POSTERIOR;
 use super::stills_files::STILLS_FILES;
-use crate::flight_log::output;
-use crate::flight_log::{FlightLog, log_name, shortened};
+use crate::files::output;
+use crate::flight_log::FlightLog;
+use crate::text::{log_name, shortened};
 
 /// Names of all files that a run can write.
 pub(crate) const RUN_FILES: [&str; 11] = [

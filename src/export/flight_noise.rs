@@ -5,9 +5,8 @@ use std::fmt::{self, Display, Formatter, Write as _};
 use serde::Serialize;
 
 use crate::calibration::{FittedDensity, FlightNoise, NoiseDensity};
-use crate::flight_log::printable;
 use crate::geometry::seconds_from_ns;
-use crate::text::Named as _;
+use crate::text::{Named as _, printable};
 
 /// One density of [`FlightNoiseReport`].
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::error::ExportError;
-use crate::flight_log::output::OutputSet;
+use crate::files::output::OutputSet;
 
 /// Writes files with their names into a folder, which is made if it is missing; returns their paths in the same order.
 pub(super) fn write_files<N: AsRef<Path>, C: AsRef<[u8]>>(

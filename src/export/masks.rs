@@ -5,7 +5,7 @@ use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 use super::error::ExportError;
-use crate::flight_log::output::OutputSet;
+use crate::files::output::OutputSet;
 use crate::log_check::ProposedMask;
 use crate::sensors::{ImageMask, Rig};
 

@@ -2,14 +2,11 @@
 
 pub(crate) mod calibration_files;
 pub(crate) mod calibration_report;
-mod covariance;
 mod error;
 mod euroc;
 mod evaluation;
 mod excerpt_files;
 pub(crate) mod existing;
-#[cfg(feature = "gui")]
-mod figure;
 pub(crate) mod file_hash;
 mod flight_noise;
 mod folder_files;
@@ -34,6 +31,8 @@ mod tables;
 pub mod trajectory;
 mod video_alignment;
 
+#[cfg(feature = "gui")]
+pub use self::screenshot::figure_bytes;
 pub use calibration_files::write_calibration;
 pub use calibration_report::{CalibrationReport, report_calibration};
 pub use error::ExportError;
@@ -46,8 +45,6 @@ pub use existing::{
     check_calibration_folder, check_converted_log, check_report_folder, check_run_folders, check_screenshot,
     check_simulated_log, check_stills_folder, other_runs, write_new_rig,
 };
-#[cfg(feature = "gui")]
-pub use figure::figure_bytes;
 pub use flight_noise::{DensityReport, FlightNoiseReport};
 pub use masks::write_masks;
 pub use motion_csv::{read_motion, write_motion};
@@ -61,8 +58,8 @@ pub use screenshot::{
     PANEL_NAMES, Renderer, STUDY_PANEL_NAMES, ScreenshotError, ScreenshotOptions, draw_panel, draw_panel_svg,
     panel_csv, png_bytes, write_csv, write_png, write_screenshot, write_svg,
 };
-pub use session_file::{is_session, open_session, read_session};
-pub use sources::{ConversionStage, ConvertedLogs, LogSources, PreparedLog, SourceError, prepare_log, prepare_session};
+pub use session_file::{open_session, prepare_session, read_session};
+pub use sources::{ConversionStage, ConvertedLogs, LogSources, PreparedLog, SourceError, is_session, prepare_log};
 pub use stills_files::write_stills;
 pub use stills_report::StillsReport;
 #[cfg(feature = "gui")]

@@ -7,8 +7,8 @@ use std::path::Path;
 use nalgebra::Vector3;
 
 use super::error::ExportError;
-use crate::flight_log::csv_writer::{CsvWriter, number_cell};
-use crate::flight_log::output;
+use crate::files::csv_writer::{CsvWriter, number_cell};
+use crate::files::output;
 use crate::simulation::{MotionSample, MotionSplines, PrescribedMotion};
 
 /// Columns before and after those of the joints.

@@ -7,7 +7,7 @@ use super::flight_noise::FlightNoiseReport;
 #[cfg(feature = "gui")]
 use super::folder_files::figure_files;
 use super::folder_files::write_files;
-use crate::flight_log::csv_writer::{CsvWriter, number_cell};
+use crate::files::csv_writer::{CsvWriter, number_cell};
 use crate::log_check::AllanReport;
 
 const TABLE: &str = "allan.csv";

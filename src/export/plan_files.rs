@@ -9,10 +9,11 @@ use super::error::ExportError;
 use super::existing::read_index;
 use super::folder_files::{remove_others, write_files};
 use super::motion_csv::motion_csv;
-use crate::flight_log::csv_writer::{CsvWriter, number_cell};
-use crate::flight_log::{output, printable, shortened};
+use crate::files::csv_writer::{CsvWriter, number_cell};
+use crate::files::output;
 use crate::observability::laboratory::{HandPlan, MotionPlan, PlanTable, SigmaRow};
 use crate::simulation::MotionSplines;
+use crate::text::{printable, shortened};
 
 const INDEX: &str = "plan.json";
 const TEXT: &str = "plan.txt";

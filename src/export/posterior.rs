@@ -9,11 +9,11 @@ use serde::{Deserialize, Serialize};
 
 use super::error::ExportError;
 use crate::estimator::{CalibrationPosterior, CameraPosterior};
-use crate::flight_log::{log_name, printable};
 use crate::geometry::Dimension;
 use crate::gimbal::{Chain, ParameterGroup, ParameterId, Parameterization, UnknownParameterization};
 use crate::sensors::Rig;
 use crate::session::{CalibrationRun, FlightPrior, FlightSigmas, Recording, RunRecord};
+use crate::text::{log_name, printable};
 
 /// File of the posterior in the folder of a run or of an offline calibration.
 pub(super) const POSTERIOR: &str = "posterior.json";

@@ -15,7 +15,7 @@ use sha2::{Digest as _, Sha256};
 use tempfile::NamedTempFile;
 
 use super::file_hash;
-use crate::flight_log::output;
+use crate::files::output;
 use crate::study::hex;
 
 /// Size limit of all entries together, in bytes; the least recently used entries are removed first.

@@ -3,15 +3,14 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::covariance::covariance_csv;
 use super::error::ExportError;
 use super::folder_files::remove_others;
 use super::masks;
 use super::posterior::{POSTERIOR, posterior_of_run};
 use super::results::stage_results;
 use super::tables::{calibration_csv, frames_csv, information_csv, rank_csv};
-use super::trajectory::{euroc_of_run, tum_of_run};
-use crate::flight_log::output::OutputSet;
+use super::trajectory::{covariance_csv, euroc_of_run, tum_of_run};
+use crate::files::output::OutputSet;
 use crate::session::{Recording, RunRecord, RunSummary, summarize};
 
 /// Trajectory as a table in EuRoC's format.

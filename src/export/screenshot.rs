@@ -1,4 +1,4 @@
-//! Screenshots of panels without a window: the same bytes on every machine.
+//! Screenshots and figures of panels without a window: the same bytes on every machine.
 
 use std::cell::RefCell;
 use std::fs;
@@ -11,13 +11,16 @@ use image::{ExtendedColorType, ImageEncoder as _, RgbaImage};
 use thiserror::Error;
 
 use super::error::ExportError;
-use crate::flight_log::output;
+use crate::files::output;
 use crate::gui::comparison::ComparisonView;
+use crate::gui::desktop::DrawnFigure;
+use crate::gui::rendering::headless::{self, HeadlessOptions};
 use crate::gui::rendering::offscreen::{Offscreen, OffscreenError};
-use crate::gui::rendering::{headless, headless::HeadlessOptions};
 use crate::gui::study::StudyPanel;
 use crate::gui::theme::{Theme, ThemeName};
-use crate::gui::window::{MainWindow, Panels, Preset, alone_ui, complete, panel_table, window_ui};
+use crate::gui::window::{
+    FigureFormat, FigureInput, FigureSpec, MainWindow, Panels, Preset, alone_ui, complete, panel_table, window_ui,
+};
 use crate::gui::{ImageSource, PanelContext, PanelName, Playback, Presentation, Selection};
 use crate::observability::SlidePosition;
 use crate::session::Recording;
@@ -275,6 +278,25 @@ pub fn write_screenshot(bytes: &[u8], path: &Path) -> Result<(), ScreenshotError
         fs::create_dir_all(folder).map_err(ExportError::write(folder))?;
     }
     Ok(output::write_file(path, bytes).map_err(ExportError::write(path))?)
+}
+
+/// Draws a figure; `command` is the command that repeats it. It is kept with the caption in the metadata of PDF and SVG
+/// files.
+///
+/// # Errors
+/// If the figure cannot be encoded.
+pub fn figure_bytes(
+    spec: &FigureSpec,
+    format: FigureFormat,
+    command: &str,
+    input: FigureInput<'_>,
+) -> Result<Vec<u8>, ScreenshotError> {
+    let description = format!("{} Command: {command}", spec.text(input.recording).caption());
+    match spec.draw(format, &description, input) {
+        Some(DrawnFigure::File(bytes)) => Ok(bytes),
+        Some(DrawnFigure::Pixels(pixels)) => png_bytes(&pixels),
+        None => Err(ScreenshotError::Font),
+    }
 }
 
 #[cfg(test)]

@@ -1,17 +1,15 @@
-//! Saved sessions as files.
+//! Saved sessions as files, on logs that are converted again when they are no longer in the cache.
 
 use std::fs;
-use std::path::Path;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::error::ExportError;
 use super::posterior::read_prior;
-use crate::session::{SavedSession, Session};
-
-/// True for the path of a saved session, `*.session.json`.
-pub fn is_session(path: &Path) -> bool {
-    path.file_name().is_some_and(|name| name.to_string_lossy().ends_with(".session.json"))
-}
+use super::sources::{ConversionStage, ConvertedLogs, LogSources, SourceError, prepare_log};
+use crate::files::LogLimits;
+use crate::session::{SavedLog, SavedSession, Session};
 
 /// Reads a saved session.
 ///
@@ -32,4 +30,35 @@ pub fn open_session(saved: &SavedSession, path: &Path) -> Result<Session, Export
     saved
         .open(prior.map(Arc::new))
         .map_err(|problem| ExportError::Session { problem: Box::new(problem), path: path.to_owned() })
+}
+
+/// The session with a log that exists: one that was converted from a recording, and is no longer in the cache, is
+/// converted again, and its rig is looked up next to the new log if it lay next to the old one. Other sessions are returned
+/// unchanged, also without their log.
+///
+/// # Errors
+/// When the recording cannot be found or converted.
+pub fn prepare_session(
+    saved: SavedSession,
+    cache: Result<&ConvertedLogs, &'static str>,
+    limits: &LogLimits,
+    progress: &mut dyn FnMut(&LogSources, ConversionStage, f64) -> ControlFlow<()>,
+) -> Result<SavedSession, SourceError> {
+    if saved.recording.is_empty() || saved.log.path.is_file() {
+        return Ok(saved);
+    }
+    let gathered = LogSources::gather(&saved.recording, limits)?;
+    let sources = LogSources { rig: saved.rig.clone().filter(|rig| rig.is_file()), ..gathered };
+    let prepared = prepare_log(&sources, cache, limits, &mut |stage, ratio| progress(&sources, stage, ratio))?;
+    let entry = saved.log.path.parent().map(Path::to_owned);
+    let moved = |path: PathBuf| match path.file_name() {
+        Some(name) if path.parent() == entry.as_deref() => prepared.log.with_file_name(name),
+        _ => path,
+    };
+    Ok(SavedSession {
+        rig: saved.rig.map(moved),
+        ground_truth: saved.ground_truth.map(moved),
+        log: SavedLog { path: prepared.log, ..saved.log },
+        ..saved
+    })
 }

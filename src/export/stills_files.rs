@@ -10,7 +10,7 @@ use super::folder_files::{remove_others, write_files};
 use super::stills_report::StillsReport;
 use super::stills_rig::rig_of_stills;
 use crate::calibration::stills::StillsOutcome;
-use crate::flight_log::csv_writer::{CsvWriter, number_cell};
+use crate::files::csv_writer::{CsvWriter, number_cell};
 use crate::sensors::Stills;
 
 /// Names of all files; the first one names the stills.

@@ -1,7 +1,7 @@
 //! The CSV tables of a run, one row per frame.
 
 use crate::estimator::Motion;
-use crate::flight_log::csv_writer::{CsvWriter, number_cell, seconds_cell};
+use crate::files::csv_writer::{CsvWriter, number_cell, seconds_cell};
 use crate::gimbal::{ParameterId, ParameterNames, Singularity};
 use crate::sensors::Rig;
 use crate::session::{RunRecord, StepRecord};

@@ -1,12 +1,14 @@
-//! Trajectories in TUM's format (`t x y z qx qy qz qw`, seconds and metres) and as tables in EuRoC's format.
+//! Trajectories in TUM's format (`t x y z qx qy qz qw`, seconds and metres) and as tables in EuRoC's format,
+//! with the covariances of their poses.
 
 use std::fmt::Write as _;
 use std::path::Path;
 
-use nalgebra::Vector4;
+use nalgebra::{Matrix6, Vector4};
 
 use super::error::ExportError;
-use crate::flight_log::csv_writer::CsvWriter;
+use super::tables::optional_cell;
+use crate::files::csv_writer::{CsvWriter, number_cell, seconds_cell};
 use crate::flight_log::{BATCH_REFERENCE, LogError, RecordedPose, read_trajectory_file};
 use crate::geometry::{RigidTransform, seconds_from_ns};
 use crate::session::accuracy::StampedPose;
@@ -105,4 +107,48 @@ pub fn read_trajectory(path: &Path) -> Result<Vec<StampedPose>, ExportError> {
     recorded.iter().map(stamped).collect::<Option<Vec<_>>>().ok_or_else(|| ExportError::NotComparable {
         problem: format!("the trajectory has positions without attitudes: {}", path.display()),
     })
+}
+
+/// Covariances of the poses of a run; with ground truth also the normalized squared errors.
+pub(super) fn covariance_csv(run: &RunRecord) -> String {
+    let errors = run.pose_errors();
+    let poses = run.steps.iter().filter_map(|step| {
+        let report = &step.report;
+        let covariance = report.newest_pose_covariance?.in_world(&report.newest()?.world_from_imu.rotation);
+        let error = errors.binary_search_by_key(&report.stamp_ns, |error| error.stamp_ns).ok();
+        Some((report.stamp_ns, covariance, error.and_then(|index| errors[index].nees())))
+    });
+    table(poses, true)
+}
+
+/// Covariances of the adjusted poses of an offline calibration.
+pub(super) fn covariance_of_calibration(run: &CalibrationRun) -> String {
+    let poses = run.outcome.trajectory.iter().filter_map(|pose| {
+        let covariance = pose.covariance?.in_world(&pose.world_from_imu.rotation);
+        Some((pose.stamp_ns, covariance, None))
+    });
+    table(poses, false)
+}
+
+/// Upper triangle of each covariance in the order of ROS messages: position before rotation, both about the world axes;
+/// with `with_nees` also the normalized squared error.
+fn table(poses: impl Iterator<Item = (i64, Matrix6<f64>, Option<f64>)>, with_nees: bool) -> String {
+    const AXES: [(&str, &str); 6] = [("x", "m"), ("y", "m"), ("z", "m"), ("rx", "rad"), ("ry", "rad"), ("rz", "rad")];
+    let upper = || (0..AXES.len()).flat_map(|row| (row..AXES.len()).map(move |column| (row, column)));
+    let name = |(row, column): (usize, usize)| {
+        let ((first, unit), (second, other_unit)) = (AXES[row], AXES[column]);
+        let unit = if unit == other_unit { format!("{unit}2") } else { format!("{unit}_{other_unit}") };
+        format!("{first}_{second}_{unit}")
+    };
+    let mut header = vec!["t_s".to_owned()];
+    header.extend(upper().map(name));
+    header.extend(with_nees.then(|| "nees".to_owned()));
+    let mut table = CsvWriter::new(header);
+    for (stamp_ns, covariance, nees) in poses {
+        let mut row = vec![seconds_cell(stamp_ns)];
+        row.extend(upper().map(|place| number_cell(covariance[place])));
+        row.extend(with_nees.then(|| optional_cell(nees.as_ref())));
+        table.row(row);
+    }
+    table.into_text()
 }

@@ -2,9 +2,10 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
-use super::LimitExceeded;
-use super::text::printable;
+use crate::files::FileError;
+use crate::files::LimitExceeded;
 use crate::sensors::UnknownCamera;
+use crate::text::printable;
 
 /// Failure to read or write a log or a rig; every message names the problem, its location and the remedy, the path
 /// last.
@@ -39,13 +40,6 @@ pub enum LogError {
     Trajectory {
         problem: String,
         /// Trajectory file or log.
-        path: PathBuf,
-    },
-    #[error("cannot use the stills: {problem}: {}", path.display())]
-    Stills {
-        /// Place in the file, what is wrong and what is expected there.
-        problem: String,
-        /// Stills file, or file of a chain.
         path: PathBuf,
     },
     #[error("line {line} {problem}; expected 't x y z qx qy qz qw': {}", path.display())]
@@ -92,6 +86,9 @@ pub enum LogError {
         found: String,
         path: PathBuf,
     },
+    /// A rig or another file that is no log.
+    #[error(transparent)]
+    File(#[from] FileError),
     #[error(transparent)]
     UnknownCamera(#[from] UnknownCamera),
     #[error(
@@ -119,19 +116,6 @@ pub enum LogError {
         stamp: String,
         /// First log time of the topic since the start of the log, in seconds.
         log_s: f64,
-        path: PathBuf,
-    },
-    #[error("{field}: {problem}: {}", path.display())]
-    Rig {
-        /// Path of the field, such as `cam0.intrinsics`.
-        field: String,
-        problem: String,
-        path: PathBuf,
-    },
-    #[error("the rig is not valid YAML: {problem}: {}", path.display())]
-    RigSyntax {
-        /// The parser's error with line and column.
-        problem: String,
         path: PathBuf,
     },
     #[error("no rig for the log: neither {} nor an attachment named *.rig.yaml exists; give one with --rig FILE: {}",

@@ -1,6 +1,7 @@
-use crate::geometry::RigidTransform;
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use super::frame::{Axis, ChainFrame};
+use crate::geometry::RigidTransform;
 
 /// Denavit–Hartenberg link, `Rz(θ + theta_offset)·Tz(d)·Tx(a)·Rx(α)` (Eq. 2).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -80,4 +81,66 @@ impl ClassicalChain {
         frames.push(frame.to_transform());
         frames
     }
+}
+
+/// Axis of a joint at angle zero, in the IMU frame: its direction and a point on it in metres.
+pub type JointAxis = (Vector3<f64>, Vector3<f64>);
+
+impl ClassicalChain {
+    /// Returns the classical chain with these joint axes and this `imu_from_camera` at encoder angles zero.
+    ///
+    /// The axes do not determine the last link (the camera's pose on the effector compensates it): it is `last`.
+    /// Without axes the chain is the extrinsics of a rigid camera.
+    pub fn from_axes(axes: &[JointAxis], last: DhLink, imu_from_camera: &RigidTransform) -> Self {
+        let Some(((first, first_point), rest)) = axes.split_first() else {
+            return Self { imu_from_base: *imu_from_camera, ..Self::default() };
+        };
+        let mut frame = RigidTransform::new(frame_about(&across(first), first), *first_point);
+        let imu_from_base = frame;
+        let mut links = Vec::with_capacity(axes.len());
+        for (next, next_point) in rest {
+            let link = link_to(&frame, next, next_point);
+            frame = frame * link.transform(0.0);
+            links.push(link);
+        }
+        frame = frame * last.transform(0.0);
+        links.push(last);
+        Self { imu_from_base, links, effector_from_camera: frame.inverse() * *imu_from_camera }
+    }
+}
+
+/// Link from a joint's frame to the next joint's axis, along their common normal.
+fn link_to(frame: &RigidTransform, next: &Vector3<f64>, next_point: &Vector3<f64>) -> DhLink {
+    let (x, z) = (frame.rotation * Vector3::x(), frame.rotation * Vector3::z());
+    let origin = frame.translation_m;
+    let between = next_point - origin;
+    let (sine, cosine) = (z.cross(next).norm(), z.dot(next));
+    let parallel = sine < 1e-9;
+    let normal = if parallel {
+        let apart = between - z * z.dot(&between);
+        if apart.norm() < 1e-9 { x } else { apart.normalize() }
+    } else {
+        z.cross(next).normalize()
+    };
+    // Feet of the common normal; parallel axes use the given point.
+    let d_m = if parallel { z.dot(&between) } else { next.cross(&normal).dot(&between) / next.cross(&normal).dot(&z) };
+    DhLink {
+        theta_offset_rad: x.cross(&normal).dot(&z).atan2(x.dot(&normal)),
+        d_m,
+        a_m: normal.dot(&between),
+        alpha_rad: z.cross(next).dot(&normal).atan2(cosine),
+    }
+}
+
+/// Unit vector orthogonal to the given one.
+fn across(direction: &Vector3<f64>) -> Vector3<f64> {
+    let helper = if direction.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() };
+    (helper - direction * direction.dot(&helper)).normalize()
+}
+
+/// Orientation with these x and z axes.
+fn frame_about(x: &Vector3<f64>, z: &Vector3<f64>) -> UnitQuaternion<f64> {
+    let z = z.normalize();
+    let matrix = Matrix3::from_columns(&[*x, z.cross(x), z]);
+    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(matrix))
 }

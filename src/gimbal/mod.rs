@@ -5,7 +5,6 @@
 //! singularity margins of its columns. A joint angle is the encoder reading plus the static offset of its link.
 //! Parameterizations and their singularities: docs/mathematics.md, sections 3 and 4.
 
-mod axes;
 mod chain;
 mod classical;
 mod conversion;
@@ -23,7 +22,7 @@ mod singularity;
 #[cfg(test)]
 pub(crate) mod tests;
 
-pub use axes::JointAxis;
+pub use self::classical::JointAxis;
 pub use chain::Chain;
 pub use classical::{ClassicalChain, DhLink};
 pub use covariance::{generic_joint_angles, stacked_jacobian, transport, transport_covariance};

@@ -1,9 +1,9 @@
-//! Capabilities of each program's configuration format.
+//! The programs whose configuration can be written, and the capabilities of each one's format.
 
-use super::{ConfigurationError, OtherEstimator};
+use super::ConfigurationError;
 use crate::camera::{CameraModel, Distortion, Projection};
 use crate::sensors::{CameraMount, Rig};
-use crate::text::Named as _;
+use crate::text::Named;
 
 /// Support of a program for time offsets between cameras and IMU.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -203,4 +203,30 @@ fn other_cameras(whole: &Rig, rig: &Rig) -> String {
         format!("; {} is rigid, its extrinsics hold at every joint angle (--camera {0})", camera.key)
     });
     format!("{} of the rig is left out{advice}", left.join(", "))
+}
+
+/// A program whose configuration can be written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OtherEstimator {
+    /// Kalibr: `camchain-imucam.yaml` and `imu.yaml`.
+    Kalibr,
+    /// VINS-Fusion: its configuration with one file per camera.
+    VinsFusion,
+    /// OpenVINS: `estimator_config.yaml`, `kalibr_imucam_chain.yaml` and `kalibr_imu_chain.yaml`.
+    OpenVins,
+    /// Basalt: a calibration in JSON.
+    Basalt,
+    /// ORB-SLAM3: settings of a monocular-inertial system.
+    OrbSlam3,
+}
+
+/// Names used by their authors.
+impl Named for OtherEstimator {
+    const NAMES: &'static [(Self, &'static str)] = &[
+        (Self::Kalibr, "Kalibr"),
+        (Self::VinsFusion, "VINS-Fusion"),
+        (Self::OpenVins, "OpenVINS"),
+        (Self::Basalt, "Basalt"),
+        (Self::OrbSlam3, "ORB-SLAM3"),
+    ];
 }

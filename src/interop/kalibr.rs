@@ -2,7 +2,7 @@
 
 use super::text;
 use super::{OtherEstimator, text::imu_from_camera};
-use crate::flight_log::yaml::{number, numbers, text as scalar};
+use crate::files::yaml::{number, numbers, text as scalar};
 use crate::sensors::{CameraRig, ImuRig, Rig};
 
 /// `camchain-imucam.yaml` and `imu.yaml`.

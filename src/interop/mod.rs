@@ -11,7 +11,6 @@ mod joint_angles;
 mod kalibr;
 mod openvins;
 mod orb_slam3;
-mod other_estimator;
 #[cfg(test)]
 mod tests;
 mod text;
@@ -23,12 +22,13 @@ mod vins_fusion;
 use std::path::{Path, PathBuf};
 
 use crate::export::{ExportError, masks};
-use crate::flight_log::output::{self, OutputSet};
+use crate::files::output;
+use crate::files::output::OutputSet;
 use crate::sensors::Rig;
 
+pub use self::format::OtherEstimator;
 pub use error::ConfigurationError;
 pub use joint_angles::{AngleOrigin, FixedJointAngles};
-pub use other_estimator::OtherEstimator;
 pub use urdf::{calibrated_description, robot_description};
 
 use format::Format;

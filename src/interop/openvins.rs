@@ -7,7 +7,7 @@ use nalgebra::Matrix3;
 use super::text::{self, imu_from_camera};
 use super::{OtherEstimator, text::lower_triangle};
 use crate::camera::Distortion;
-use crate::flight_log::yaml::{number, numbers};
+use crate::files::yaml::{number, numbers};
 use crate::sensors::{CameraRig, ImuRig, KalibrImuMatrices, Rig};
 
 /// Settings that do not depend on the rig, with OpenVINS's usual values.

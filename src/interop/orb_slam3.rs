@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::text::{self, imu_from_camera};
 use crate::camera::Distortion;
-use crate::flight_log::yaml::number;
+use crate::files::yaml::number;
 use crate::sensors::Rig;
 
 /// `orb_slam3.yaml`.
@@ -25,9 +25,9 @@ pub(super) fn files(rig: &Rig, head: &[String]) -> Vec<(String, Vec<u8>)> {
     };
     let mut out = text::opencv_comments(head);
     out.push_str("# Images: the frames of ");
-    out.push_str(&crate::flight_log::printable(&camera.topic));
+    out.push_str(&crate::text::printable(&camera.topic));
     out.push_str(", IMU: ");
-    out.push_str(&crate::flight_log::printable(&rig.imu.topic));
+    out.push_str(&crate::text::printable(&rig.imu.topic));
     out.push_str(". The settings name no topic.\n");
     out.push_str(&text::entries(&[
         ("File.version", "\"1.0\"".to_owned()),

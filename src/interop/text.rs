@@ -5,11 +5,10 @@ use std::fmt::Write as _;
 use nalgebra::SMatrix;
 
 use super::OtherEstimator;
-use crate::flight_log::printable;
-use crate::flight_log::yaml::{number, numbers};
+use crate::files::yaml::{number, numbers};
 use crate::geometry::RigidTransform;
 use crate::sensors::{CameraMount, CameraRig, GrayImage, ImageMask, Rig};
-use crate::text::Named as _;
+use crate::text::{Named as _, printable};
 
 /// Text in the first line of every file, which identifies files of this program.
 pub(super) const MARK: &str = "Written by dcvins export";

@@ -4,10 +4,10 @@ use std::fmt::Write as _;
 
 use super::text::MARK;
 use super::{Configuration, ConfigurationError};
-use crate::flight_log::printable;
-use crate::flight_log::urdf::{ChangedOrigin, LinkPath, UrdfError, roll_pitch_yaw};
+use crate::files::urdf::{ChangedOrigin, LinkPath, UrdfError, roll_pitch_yaw};
 use crate::geometry::RigidTransform;
 use crate::sensors::{CameraMount, CameraRig, GimbalRig, Rig};
+use crate::text::printable;
 
 /// Link of the IMU, the root of the written tree.
 const IMU_LINK: &str = "imu_link";

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::text::{self, imu_from_camera};
 use crate::camera::{CameraModel, Distortion, Projection};
-use crate::flight_log::yaml::number;
+use crate::files::yaml::number;
 use crate::sensors::Rig;
 
 /// `vins_config.yaml`, `cam0.yaml` and, with two cameras, `cam1.yaml`.

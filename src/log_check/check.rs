@@ -35,7 +35,7 @@ pub fn check(log: &FlightLog, rig: Result<&Rig, &LogError>, image_rotations: &[I
         ),
     }
     stamps::check_timing(&survey, rig.ok(), &mut findings);
-    imu::orientation_topics::check_orientation_topics(log, rig, &mut findings);
+    imu::unmeasured::check_orientation_topics(log, rig, &mut findings);
     let imu_facts = imu::check_imu(&survey, rig.ok(), &mut findings);
     imu::axes::check_imu_axes(&imu_facts, &mut findings);
     let mut proposed_masks = Vec::new();

@@ -11,7 +11,7 @@ use tempfile::TempDir;
 use super::check;
 use super::report::{CheckReport, ImageRotation, Severity};
 use crate::camera::CameraModel;
-use crate::flight_log::{FlightLog, LogWriter, LogWriterOptions, MessageTimes};
+use crate::flight_log::{FlightLog, LogError, LogWriter, LogWriterOptions, MessageTimes};
 use crate::geometry::SplitMix64;
 use crate::sensors::{GrayImage, Rig};
 
@@ -176,7 +176,7 @@ impl Flight {
     pub(super) fn check(&self, rotations: &[ImageRotation]) -> CheckReport {
         let folder = TempDir::new().unwrap();
         let log = self.write(folder.path());
-        let rig = Rig::from_yaml(&self.rig, Path::new("test.rig.yaml"));
+        let rig = Rig::from_yaml(&self.rig, Path::new("test.rig.yaml")).map_err(LogError::from);
         check(&log, rig.as_ref(), rotations)
     }
 }

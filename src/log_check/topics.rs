@@ -2,8 +2,8 @@
 
 use super::report::{Area, Findings, Severity, TopicReport};
 use super::survey::Survey;
-use crate::flight_log::attitude::{VEHICLE_KINDS, gimbal_kinds, topic_field};
-use crate::flight_log::topic_info::nothing_read;
+use crate::flight_log::joints::attitude::{VEHICLE_KINDS, gimbal_kinds, topic_field};
+use crate::flight_log::log::topic_info::nothing_read;
 use crate::flight_log::{FlightLog, LogError, MessageKind, TopicInfo, WarningKind};
 use crate::geometry::seconds_from_ns;
 use crate::sensors::Rig;

@@ -1,17 +1,17 @@
-//! The content of a report as data: `report.json`, and the input of the HTML page.
+//! The content of a report as data, and the options that add to it: `report.json`, and the input of the HTML page.
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 use serde::Serialize;
 
 use super::inputs::InputFile;
-use super::options::ReportOptions;
 use super::rank_intervals::{RankInterval, rank_intervals};
 use super::verdict::{RunVerdict, Statement, log_statement};
-use crate::flight_log::log_name;
 use crate::geometry::seconds_from_ns;
 use crate::log_check::CheckReport;
 use crate::session::{FlightParameter, Recording, RunRecord, RunSummary, WarningLine, log_warning_lines};
+use crate::text::log_name;
 
 /// A notable event of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -136,6 +136,39 @@ fn words(name: &str) -> String {
         words.push(letter.to_ascii_lowercase());
     }
     words
+}
+
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ReportFigure {
+    /// Heading above the figure, once for consecutive figures with the same heading.
+    pub heading: String,
+    /// Content, run and time; the page adds the number of the figure.
+    pub title: String,
+    /// Legend: colours, dashes, units.
+    pub reading: String,
+    /// True for a figure of half the width of the page, beside the next one of that width.
+    pub half: bool,
+    pub drawing: ReportDrawing,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum ReportDrawing {
+    /// A PNG file, for images and the 3D scene.
+    Png(Vec<u8>),
+    /// An SVG, for plots; the prefix of its element ids is unique in the report.
+    Svg(String),
+}
+
+/// Contents of a report in addition to the recording.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ReportOptions {
+    pub command: String,
+    /// Input files, listed with their hashes.
+    pub inputs: Vec<PathBuf>,
+    /// Figures in the order of the page.
+    pub figures: Vec<ReportFigure>,
+    /// Findings of `check` about the log and its rig.
+    pub check: Option<CheckReport>,
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-use super::options::{ReportDrawing, ReportFigure};
+use super::content::{ReportDrawing, ReportFigure};
 use super::verdict::StatementLevel;
 
 /// Maximum number of rows of a table that is not split between printed pages.

@@ -6,7 +6,6 @@ mod content;
 mod html;
 mod inputs;
 mod numbers;
-mod options;
 mod page;
 mod rank_intervals;
 mod study;
@@ -16,16 +15,16 @@ mod verdict;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+pub use self::content::{ReportDrawing, ReportFigure, ReportOptions};
 use content::ReportContent;
 use inputs::InputFile;
-pub use options::{ReportDrawing, ReportFigure, ReportOptions};
 use serde_json::Value;
 pub use study::{StudyReport, check_study_report, write_study_report};
 
 use crate::export::existing::{RUN_FILES, check_run_folder, read_index};
 use crate::export::run_files::{remove_unwritten, stage_run};
 use crate::export::{CachedFile, ExportError, RunFileOptions};
-use crate::flight_log::output::OutputSet;
+use crate::files::output::OutputSet;
 use crate::session::Recording;
 
 /// The files of each run, without measured times.

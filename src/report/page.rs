@@ -2,10 +2,9 @@
 
 use maud::{Markup, html};
 
-use super::content::{ReportContent, RunContent};
+use super::content::{ReportContent, ReportFigure, RunContent};
 use super::html::{document, figure, icon, list, list_in_columns, unbroken};
 use super::numbers::number;
-use super::options::ReportFigure;
 use super::rank_intervals::RankInterval;
 use super::tables;
 use super::verdict::Statement;

@@ -6,12 +6,13 @@ use std::path::{Path, PathBuf};
 use maud::{Markup, html};
 use serde::Serialize;
 
+use super::content::ReportFigure;
 use super::html::{document, figure, table};
 use super::numbers::number;
-use super::options::ReportFigure;
 use crate::export::ExportError;
 use crate::export::existing::read_index;
-use crate::flight_log::output::{self, OutputSet};
+use crate::files::output;
+use crate::files::output::OutputSet;
 use crate::study::view::{GroupSummary, ParameterErrors};
 
 /// File that identifies the report of a study.

@@ -1,11 +1,9 @@
-//! Mask of the pixels of a camera that show the vehicle itself.
+//! Gray images, and the mask of the pixels of a camera that show the vehicle itself.
 
 use std::fmt;
 use std::sync::Arc;
 
 use nalgebra::Vector2;
-
-use super::GrayImage;
 
 /// Smallest gray value of a masked pixel in a mask image.
 const MASKED_FROM: u8 = 128;
@@ -61,4 +59,15 @@ impl fmt::Debug for ImageMask {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(out, "ImageMask({}×{}, {:.1} % masked)", self.width, self.height, 100.0 * self.ratio())
     }
+}
+
+/// 8-bit gray image, rows top to bottom without padding.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct GrayImage {
+    /// In pixels.
+    pub width: usize,
+    /// In pixels.
+    pub height: usize,
+    /// `width · height` gray values.
+    pub pixels: Vec<u8>,
 }

@@ -3,9 +3,6 @@
 
 mod angular_rates;
 mod attitude_source;
-mod camera_values;
-mod fixed_gimbal;
-mod gray_image;
 mod image_mask;
 mod imu;
 mod imu_intrinsics;
@@ -19,8 +16,7 @@ pub use angular_rates::AngularRates;
 pub use attitude_source::{
     AngleUnit, AttitudeFrame, AttitudeMessage, AttitudeSource, AttitudeValue, EulerAngles, EulerRotation,
 };
-pub use gray_image::GrayImage;
-pub use image_mask::ImageMask;
+pub use image_mask::{GrayImage, ImageMask};
 pub use imu::{ImuNoise, ImuSample, rotation_steps};
 pub use imu_intrinsics::{ImuIntrinsics, ImuIntrinsicsParameters, KalibrImuMatrices, ScaleMisalignment};
 pub use joints::{JointAngles, JointMotionFit, JointSample};

@@ -3,6 +3,7 @@
 use thiserror::Error;
 
 use super::experiment::{Experiment, WorldKind};
+use crate::files::FileError;
 use crate::flight_log::LogError;
 use crate::text::Named as _;
 
@@ -49,4 +50,6 @@ pub enum SimulationError {
     /// A file could not be written.
     #[error(transparent)]
     Log(#[from] LogError),
+    #[error(transparent)]
+    File(#[from] FileError),
 }

@@ -26,7 +26,7 @@ use super::scenario::{Scenario, ScenarioOptions, gravity_m_per_s2, stream};
 use super::trajectory::{AIR_DRAG_PER_S, Trajectory, VehicleLimits};
 use super::vibration::shake;
 use super::world;
-use crate::flight_log::output::OutputSet;
+use crate::files::output::OutputSet;
 use crate::flight_log::{LogError, LogWriter, LogWriterOptions, MessageTimes, Odometry};
 use crate::geometry::{ns_from_seconds, seconds_from_ns, so3};
 use crate::sensors::{CameraRig, GimbalRig, ImuRig, ImuSample, JointSample, Rig};

@@ -4,6 +4,7 @@
 //! pair is the logarithm of the ratio of its two values, so that easy and difficult flights have equal weight. The mean
 //! over all pairs and its 95 % interval (Student's t) are computed. A metric is worse when its mean ratio is beyond the
 //! tolerance and the interval excludes 1.
+//! A baseline is the table of runs reduced to what is kept for such comparisons.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -14,7 +15,7 @@ use thiserror::Error;
 use super::columns::{Direction, PAIRING_COLUMNS, run_column};
 use super::pairing::{RunPair, pair_runs};
 use super::statistics::MeanInterval;
-use super::table::StudyTable;
+use super::table::{StudyTable, TableError};
 
 /// Metric that compares the numbers of runs with a result.
 pub const SUCCESS: &str = "success";
@@ -313,4 +314,15 @@ impl fmt::Display for StudyComparison {
              the tolerance, and the interval excludes 1."
         )
     }
+}
+
+/// The table of runs without what differs between two machines: paths, the program, times and memory.
+///
+/// Equal results give equal tables on every machine, so a baseline can be committed.
+///
+/// # Errors
+/// Never for a table, whose columns have one length and different names.
+pub fn baseline_table(runs: &StudyTable) -> Result<StudyTable, TableError> {
+    let kept = |name: &str| !run_column(name).is_some_and(|column| column.local);
+    StudyTable::new(runs.columns().iter().filter(|column| kept(&column.name)).cloned().collect())
 }

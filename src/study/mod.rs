@@ -3,16 +3,14 @@
 //! Everything here is plain data and computation on it; files are read and written by `sweep/`, processes are
 //! started by the command line.
 //!
-//! - `plan/`: the TOML text of a plan as typed values; every error names line and key.
+//! - `plan/`: the TOML text of a plan as typed values, every error names line and key; its tables as Markdown.
 //! - `recipe`, `perturbation`: simulated flights and errors of a rig.
 //! - `job`, `expansion`: a job with its key, and the jobs of a plan.
 //! - `baseline`, `comparison`, `pairing`, `statistics`: a study against a baseline, paired and with intervals.
-//! - `summary_table`: statistics of groups of runs as Markdown.
 //! - `table`: columns of values with units and descriptions.
 //! - `columns/`: the columns of the tables of a study, each with name, unit, meaning and value in one definition.
 //! - `view/`: what the study view shows: filters, groups, distributions, differences.
 
-mod baseline;
 mod columns;
 mod comparison;
 mod expansion;
@@ -22,27 +20,27 @@ mod perturbation;
 mod plan;
 mod recipe;
 mod statistics;
-mod summary_table;
 mod table;
 #[cfg(test)]
 mod tests;
 pub mod view;
 
-pub use baseline::baseline_table;
 pub use columns::{
     Direction, JobCosts, JobResult, JobStatus, PAIRING_COLUMNS, RunResult, StudyTables, frames_table, parameters_table,
     runs_table,
 };
-pub use comparison::{ComparisonError, MetricComparison, PairedVerdict, SUCCESS, StudyComparison, WorstPair, compare};
+pub use comparison::{
+    ComparisonError, MetricComparison, PairedVerdict, SUCCESS, StudyComparison, WorstPair, baseline_table, compare,
+};
 pub use expansion::{expand, shard};
 pub use job::{JobLog, JobSubject, KeyedJob, RecordedLog, SimulatedFlight, StudyJob, StudyTrajectory, hex};
 pub use perturbation::{
     Distribution, MagnitudeDimension, PerturbationError, PerturbationStart, RigChange, RigPerturbation, RigQuantity,
 };
 pub use plan::{
-    DisturbanceSet, Exclusion, JobLimits, LOG_PLACE, LogSource, PlanError, SlurmOptions, StudyOutput, StudyPlan,
+    DisturbanceSet, Exclusion, JobLimits, LOG_PLACE, LogSource, PlanError, ReferenceValue, SlurmOptions, Statistic,
+    StudyOutput, StudyPlan, SummaryColumn, SummaryTable,
 };
 pub use recipe::{EncoderNoise, FlightRecipe};
 pub use statistics::MeanInterval;
-pub use summary_table::{ReferenceValue, Statistic, SummaryColumn, SummaryTable};
 pub use table::{Cell, ColumnType, ColumnValues, StudyColumn, StudyTable, TableError};

@@ -65,7 +65,7 @@ impl StudyFileError {
         move |source| Self::Read { source, path: path.to_owned() }
     }
 
-    /// For `map_err` behind [`OutputSet::commit`](crate::flight_log::output::OutputSet::commit).
+    /// For `map_err` behind [`OutputSet::commit`](crate::files::output::OutputSet::commit).
     pub(super) fn commit((path, source): (PathBuf, io::Error)) -> Self {
         Self::Write { source, path }
     }

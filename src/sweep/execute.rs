@@ -13,7 +13,7 @@ use crate::export::calibration_files::write_calibration;
 use crate::export::calibration_report::report_calibration;
 use crate::export::masks;
 use crate::export::run_files::{RunFileOptions, write_run};
-use crate::flight_log::output::OutputSet;
+use crate::files::output::OutputSet;
 use crate::flight_log::{FlightLog, LogError};
 use crate::sensors::Rig;
 use crate::session::{

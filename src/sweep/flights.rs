@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::error::StudyFileError;
 use super::folder::StudyFolder;
 use super::inputs::file_sha256;
-use crate::flight_log::output;
+use crate::files::output;
 use crate::session::Stopwatch;
 use crate::simulation::{SimulationError, SimulationProgress, simulate_interruptible};
 use crate::study::SimulatedFlight;

@@ -17,7 +17,8 @@ use serde::{Deserialize, Serialize};
 
 use super::error::StudyFileError;
 use super::parquet_table::{read_parquet, stage_parquet};
-use crate::flight_log::output::{self, OutputSet};
+use crate::files::output;
+use crate::files::output::OutputSet;
 use crate::study::{KeyedJob, SimulatedFlight, StudyJob, StudyOutput, StudyPlan, StudyTable, StudyTables};
 
 /// File that identifies the folder of a study.

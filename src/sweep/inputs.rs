@@ -11,7 +11,8 @@ use sha2::{Digest as _, Sha256};
 
 use super::error::StudyFileError;
 use crate::export::file_hash;
-use crate::flight_log::{FlightLog, output};
+use crate::files::output;
+use crate::flight_log::FlightLog;
 use crate::geometry::seconds_from_ns;
 use crate::sensors::Rig;
 use crate::session::{TrajectorySource, TrajectorySpec};

@@ -20,7 +20,8 @@ use parquet::schema::types::Type;
 use serde::{Deserialize, Serialize};
 
 use super::error::StudyFileError;
-use crate::flight_log::output::{self, OutputFile, StagedFile};
+use crate::files::output;
+use crate::files::output::{OutputFile, StagedFile};
 use crate::study::{ColumnType, ColumnValues, StudyColumn, StudyTable};
 
 /// Key of the metadata with units and descriptions.

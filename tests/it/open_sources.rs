@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use dcvins::flight_log::urdf::{CameraAxes, RobotModel};
+use dcvins::files::urdf::{CameraAxes, RobotModel};
 use dcvins::sensors::Rig;
 use dcvins::session::{Session, SessionRequest};
 

@@ -1,11 +1,16 @@
-//! Arguments of `dcvins sweep`.
+//! Arguments of `dcvins sweep`, and the plan that they name with its folder and its jobs.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
+use std::str::FromStr;
 
 use anyhow::Result;
 use clap::Args;
+use dcvins::study::{self, KeyedJob, StudyPlan};
+use dcvins::sweep::{StudyFolder, find_logs, program_identity, read_plan};
+use dcvins::text::Entry;
 
-use super::tolerance::Tolerance;
+use crate::cli::terminal::Progress;
 
 #[derive(Args, Clone, Debug)]
 pub(crate) struct SweepArguments {
@@ -65,6 +70,68 @@ fn shard(text: &str) -> Result<(usize, usize), String> {
     inside.ok_or_else(|| "expected I/N with I from 1 to N, as in 3/8".to_owned())
 }
 
+/// A plan with its folder and its jobs.
+pub(super) struct Sweep {
+    pub(super) plan: StudyPlan,
+    pub(super) folder: StudyFolder,
+    pub(super) program: String,
+    pub(super) jobs: Vec<KeyedJob>,
+}
+
+/// Reads the plan, finds its logs and lists its jobs.
+pub(super) fn open(arguments: &SweepArguments) -> Result<Sweep> {
+    let plan = read_plan(&arguments.plan)?;
+    let folder = StudyFolder::create(&arguments.out, &plan, &arguments.plan)?;
+    let program = program_identity()?;
+    let progress = Progress::spinner("reading the logs");
+    let logs = find_logs(&plan, &arguments.plan, &folder.hash_cache())?;
+    drop(progress);
+    let jobs = study::expand(&plan, &logs, &program);
+    Ok(Sweep { plan, folder, program, jobs })
+}
+
+/// Removes the rows of jobs that have no result.
+pub(super) fn forget_failed(sweep: &Sweep) -> Result<()> {
+    for job in &sweep.jobs {
+        let row = sweep.folder.run_of(&job.key)?;
+        if row.is_some_and(|row| !matches!(row.text(0, "status"), Some("ok" | "not-initialized"))) {
+            sweep.folder.forget(&job.key)?;
+        }
+    }
+    Ok(())
+}
+
+/// Metrics that are compared if neither the plan nor the command line names one.
+const STANDARD: [(&str, f64); 1] = [("ate_rmse_m", 0.1)];
+
+/// Allowed relative change of a metric.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Tolerance {
+    metric: String,
+    ratio: f64,
+}
+
+impl FromStr for Tolerance {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let entry = Entry::parse(text).filter(|entry| !entry.key.is_empty());
+        entry
+            .and_then(|entry| Some(Self { metric: entry.key.to_owned(), ratio: entry.number(&(0.0..=f64::MAX))? }))
+            .ok_or_else(|| "expected COLUMN=RATIO with a ratio from 0 up, as in ate_rmse_m=0.1".to_owned())
+    }
+}
+
+/// Tolerances of the command line, else of the plan, else the defaults.
+pub(super) fn tolerances(plan: &StudyPlan, given: &[Tolerance]) -> BTreeMap<String, f64> {
+    let standard = || STANDARD.map(|(metric, ratio)| (metric.to_owned(), ratio)).into();
+    match (given, plan.tolerances.is_empty()) {
+        ([], true) => standard(),
+        ([], false) => plan.tolerances.clone(),
+        _ => given.iter().map(|tolerance| (tolerance.metric.clone(), tolerance.ratio)).collect(),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -74,6 +141,15 @@ mod tests {
         assert_eq!(shard("3/8"), Ok((3, 8)));
         for wrong in ["0/8", "9/8", "3", "a/8", "3/0", "-1/2"] {
             assert!(shard(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn a_tolerance_is_a_column_and_a_ratio() {
+        let tolerance: Tolerance = "ate_rmse_m=0.1".parse().unwrap();
+        assert_eq!((tolerance.metric.as_str(), tolerance.ratio), ("ate_rmse_m", 0.1));
+        for wrong in ["ate_rmse_m", "=0.1", "ate_rmse_m=-0.1", "ate_rmse_m=a", "ate_rmse_m=inf"] {
+            assert!(wrong.parse::<Tolerance>().is_err(), "{wrong}");
         }
     }
 }

@@ -6,7 +6,7 @@ use anyhow::{Result, bail};
 use dcvins::study::{JobLog, KeyedJob};
 use serde::Serialize;
 
-use super::opened::Sweep;
+use super::arguments::Sweep;
 use super::pool::{Pool, PoolLimits, duration_text};
 use crate::cli::exit::ExitOutcome;
 use crate::cli::interrupt::Interrupt;

@@ -3,10 +3,8 @@
 mod arguments;
 mod estimate;
 mod job;
-mod opened;
 mod pool;
 mod slurm;
-mod tolerance;
 
 use std::path::PathBuf;
 
@@ -20,8 +18,8 @@ use crate::cli::interrupt::Interrupt;
 use crate::cli::terminal::{notify, print, print_json};
 
 pub(crate) use arguments::SweepArguments;
+use arguments::{Sweep, forget_failed, open, tolerances};
 pub(crate) use job::{SweepJobArguments, sweep_job};
-use opened::{Sweep, forget_failed, open};
 use pool::{Pool, PoolLimits, PoolOutcome};
 
 /// Fraction of the available memory that jobs may use by default.
@@ -143,7 +141,7 @@ fn finish(
         report.files.push(path.clone());
     }
     if let Some(baseline) = baseline {
-        let tolerances = tolerance::tolerances(&sweep.plan, &arguments.tolerance);
+        let tolerances = tolerances(&sweep.plan, &arguments.tolerance);
         report.comparison = Some(study::compare(baseline, &tables.runs, &tolerances)?);
     }
     print_sweep(&report, arguments.json)?;

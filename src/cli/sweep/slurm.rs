@@ -9,8 +9,7 @@ use anyhow::{Context as _, Result, bail};
 use dcvins::study::{self, JobCosts, JobLog, JobStatus, KeyedJob, SlurmOptions};
 use dcvins::sweep::write_text;
 
-use super::arguments::SweepArguments;
-use super::opened::Sweep;
+use super::arguments::{Sweep, SweepArguments};
 use super::pool::{PoolOutcome, last_lines};
 use crate::cli::exit::JOBS_FAILED;
 use crate::cli::interrupt::Interrupt;

@@ -1,4 +1,4 @@
-//! Writing of all sensors of a log into an unfinished folder.
+//! Writing of all sensors of a log into an unfinished folder, each table row by row.
 
 use std::fs::{self, File};
 use std::io::BufWriter;
@@ -11,17 +11,17 @@ use image::{ExtendedColorType, ImageEncoder as _};
 
 use super::report::{EurocCamera, EurocReport};
 use super::sensor_yaml::{body_yaml, camera_yaml, ground_truth_yaml, imu_yaml};
-use super::table::SampleTable;
 use crate::export::error::ExportError;
 use crate::export::masks;
 use crate::export::trajectory::EUROC_COLUMNS;
+use crate::files::output;
 use crate::flight_log::convert::{EUROC_GIMBAL, EUROC_GROUND_TRUTH, EUROC_RIG, rig_of_euroc_folder};
 use crate::flight_log::{
-    FlightLog, LogWarning, SensorSamples, ground_truth_poses, imu_samples, joint_samples, log_name, output,
-    recorded_images,
+    FlightLog, LogWarning, SensorSamples, ground_truth_poses, imu_samples, joint_samples, recorded_images,
 };
 use crate::geometry::RigidTransform;
 use crate::sensors::{CameraMount, CameraRig, GrayImage, PoseSample, Rig};
+use crate::text::log_name;
 
 /// Description of the body, which names the log from which a folder was made.
 pub(super) const BODY: &str = "body.yaml";
@@ -249,4 +249,52 @@ fn write_image(path: &Path, image: &GrayImage) -> Result<(), ExportError> {
         image::ImageError::IoError(source) => ExportError::Write { source, path: path.to_owned() },
         other => ExportError::Write { source: std::io::Error::other(other.to_string()), path: path.to_owned() },
     })
+}
+
+/// Rows of a stamp in nanoseconds and further cells.
+pub(super) struct SampleTable {
+    rows: csv::Writer<BufWriter<File>>,
+    count: u64,
+    path: PathBuf,
+}
+
+impl SampleTable {
+    /// Creates a file, and its folder if it is missing.
+    pub(super) fn create(path: &Path, columns: &[String]) -> Result<Self, ExportError> {
+        let folder = output::folder_of(path);
+        let file = fs::create_dir_all(&folder).and_then(|()| File::create(path));
+        let file = BufWriter::new(file.map_err(ExportError::write(path))?);
+        let mut table = Self { rows: csv::Writer::from_writer(file), count: 0, path: path.to_owned() };
+        table.write(columns)?;
+        Ok(table)
+    }
+
+    /// Appends numbers, which read back exactly.
+    pub(super) fn row<'a>(
+        &mut self,
+        stamp_ns: i64,
+        numbers: impl IntoIterator<Item = &'a f64>,
+    ) -> Result<(), ExportError> {
+        let numbers = numbers.into_iter().map(f64::to_string);
+        let cells: Vec<String> = std::iter::once(stamp_ns.to_string()).chain(numbers).collect();
+        self.count += 1;
+        self.write(&cells)
+    }
+
+    /// Appends a row with a text.
+    pub(super) fn text_row(&mut self, stamp_ns: i64, text: &str) -> Result<(), ExportError> {
+        self.count += 1;
+        self.write(&[stamp_ns.to_string(), text.to_owned()])
+    }
+
+    /// Number of rows of the complete table.
+    pub(super) fn finish(mut self) -> Result<u64, ExportError> {
+        self.rows.flush().map_err(ExportError::write(&self.path))?;
+        Ok(self.count)
+    }
+
+    fn write(&mut self, cells: &[String]) -> Result<(), ExportError> {
+        let written = self.rows.write_record(cells);
+        written.map_err(|error| ExportError::Write { source: error.into(), path: self.path.clone() })
+    }
 }

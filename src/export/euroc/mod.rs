@@ -6,7 +6,6 @@
 mod conversion;
 mod report;
 mod sensor_yaml;
-mod table;
 #[cfg(test)]
 mod tests;
 
@@ -19,8 +18,10 @@ use self::conversion::{BODY, Conversion};
 pub use self::report::{EurocCamera, EurocReport};
 use self::sensor_yaml::body_yaml;
 use super::error::ExportError;
-use crate::flight_log::{FlightLog, LogError, log_name, output};
+use crate::files::output;
+use crate::flight_log::{FlightLog, LogError};
 use crate::sensors::{CameraMount, CameraRig, Rig};
+use crate::text::log_name;
 
 /// Folder of the sensors.
 const SENSORS: &str = "mav0";

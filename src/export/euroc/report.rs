@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 
 use serde::{Serialize, Serializer};
 
-use crate::flight_log::{FlightLog, printable};
+use crate::flight_log::FlightLog;
 use crate::geometry::seconds_from_ns;
-use crate::text::counted;
+use crate::text::{counted, printable};
 
 /// Camera of the folder.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use crate::camera::Distortion;
-use crate::flight_log::yaml::{number, numbers, text};
+use crate::files::yaml::{number, numbers, text};
 use crate::geometry::RigidTransform;
 use crate::sensors::{CameraMount, CameraRig, ImuRig};
 

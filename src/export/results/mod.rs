@@ -5,19 +5,17 @@
 //! are those of the images, so that playback is synchronous with the log; stamps are the estimator's.
 
 mod annotations;
-mod names;
 mod series;
 
 use std::path::Path;
 
-use crate::flight_log::output::StagedFile;
+use crate::files::output::StagedFile;
 use crate::flight_log::{LogError, LogLevel, LogWriter, LogWriterOptions, MessageTimes, NamedTransform, Odometry};
 use crate::frontend::FeatureId;
 use crate::geometry::RigidTransform;
 use crate::gimbal::ClassicalChain;
 use crate::session::{Recording, RunRecord, StepRecord};
-use names::Names;
-use series::Series;
+use series::{Names, Series};
 
 /// World frame common to all runs: that of the ground truth if there is one.
 const WORLD: &str = "world";

@@ -1,6 +1,5 @@
-//! Named numbers over time: calibration with σ, joint angles, rank, frame statistics.
+//! Named numbers of a run over time: calibration with σ, joint angles, rank, frame statistics.
 
-use super::names::Names;
 use crate::flight_log::{LogError, LogWriter, MessageTimes};
 use crate::gimbal::ParameterId;
 use crate::sensors::Rig;
@@ -96,5 +95,29 @@ impl Series {
             ("informed_threshold", rank.informed_threshold),
         ];
         log.write_row(&names.topic("rank"), "dcvins_msgs/msg/Rank", times, &row)
+    }
+}
+
+/// Prefix of the topics and frames of one run.
+pub(super) struct Names {
+    /// The label; characters that ROS does not allow in a topic are replaced.
+    label: String,
+}
+
+impl Names {
+    pub(super) fn new(label: &str) -> Self {
+        let allowed = |letter: char| if letter.is_ascii_alphanumeric() { letter } else { '_' };
+        let label: String = label.chars().map(allowed).collect();
+        // The name of a topic must not begin with a digit.
+        let digit = label.starts_with(|first: char| first.is_ascii_digit());
+        Self { label: if digit || label.is_empty() { format!("run_{label}") } else { label } }
+    }
+
+    pub(super) fn topic(&self, name: &str) -> String {
+        format!("/{}/{name}", self.label)
+    }
+
+    pub(super) fn frame(&self, name: &str) -> String {
+        format!("{}/{name}", self.label)
     }
 }

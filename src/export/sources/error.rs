@@ -5,7 +5,7 @@ use thiserror::Error;
 
 use crate::export::{ExportError, VideoAlignmentError};
 use crate::flight_log::convert::ConvertError;
-use crate::flight_log::log_name;
+use crate::text::log_name;
 
 /// Reason why files cannot be opened as a log; every message names the problem, its location and the remedy.
 #[derive(Debug, Error)]

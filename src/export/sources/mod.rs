@@ -6,7 +6,6 @@
 mod converted_logs;
 mod error;
 mod prepare;
-mod saved_session;
 #[cfg(test)]
 mod tests;
 
@@ -17,10 +16,10 @@ use std::path::{Path, PathBuf};
 pub use self::converted_logs::ConvertedLogs;
 pub use self::error::SourceError;
 pub use self::prepare::{ConversionStage, PreparedLog, prepare_log};
-pub use self::saved_session::prepare_session;
-use super::session_file::is_session;
+use crate::files::LogLimits;
 use crate::flight_log::convert::{AutopilotLog, SourceKind, source_kind};
-use crate::flight_log::{LogLimits, is_imu_file_of, is_rig_name, log_name};
+use crate::flight_log::{is_imu_file_of, is_rig_name};
+use crate::text::log_name;
 
 /// Endings of rigs, in lower case.
 const RIG_ENDINGS: [&str; 2] = ["yaml", "yml"];
@@ -155,4 +154,9 @@ fn one_rig(rigs: &[PathBuf]) -> Result<Option<PathBuf>, SourceError> {
         left = named;
     }
     Ok(left.pop())
+}
+
+/// True for the path of a saved session, `*.session.json`.
+pub fn is_session(path: &Path) -> bool {
+    path.file_name().is_some_and(|name| name.to_string_lossy().ends_with(".session.json"))
 }

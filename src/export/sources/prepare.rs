@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 
 use super::{ConvertedLogs, LogSources, SourceError};
 use crate::export::video_alignment::{align_video, write_alignment_plot};
+use crate::files::LogLimits;
 use crate::flight_log::convert::{ConversionReport, ConvertOptions, SourceKind, convert_with};
-use crate::flight_log::{LogLimits, log_name};
+use crate::text::log_name;
 
 /// Fraction of the progress that the alignment of a video with the log of its autopilot takes.
 const ALIGNED: f64 = 0.5;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use super::{ConversionStage, ConvertedLogs, LogSources, PreparedLog, SourceError, prepare_log};
-use crate::flight_log::LogLimits;
+use crate::files::LogLimits;
 use crate::flight_log::convert::SourceKind;
 
 fn gather(folder: &Path, names: &[&str]) -> Result<LogSources, SourceError> {

@@ -11,8 +11,8 @@ use std::sync::Arc;
 use thiserror::Error;
 
 pub use self::plot::write_alignment_plot;
+use crate::files::output::folder_of;
 use crate::flight_log::convert::{ConvertError, ConvertOptions, ForceAgreement, VideoClock, convert_with};
-use crate::flight_log::output::folder_of;
 use crate::flight_log::{FlightLog, LogError};
 use crate::geometry::seconds_from_ns;
 use crate::log_check::{AlignmentError, AlignmentReference, ClockAlignment, align_camera};

@@ -7,7 +7,7 @@ use maud::{Markup, html};
 
 use super::{AlignmentEvidence, VideoAlignment};
 use crate::export::ExportError;
-use crate::flight_log::output::write_file;
+use crate::files::output::write_file;
 use crate::gui::plot::ticks;
 use crate::log_check::ClockAlignment;
 

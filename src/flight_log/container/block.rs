@@ -3,10 +3,10 @@ use std::sync::Arc;
 
 use mcap::records::{ChunkHeader, Record, op};
 
-use super::super::file::LogFile;
-use super::super::limits::LogLimits;
+use super::file::LogFile;
 use super::unpack::unpack_chunk;
 use super::{RECORD_HEADER, record_at};
+use crate::files::LogLimits;
 
 /// Range of the file with messages: one chunk record, or message records outside of chunks.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -5,10 +5,11 @@ use std::sync::Arc;
 use mcap::MAGIC;
 use mcap::records::{ChunkHeader, Record, op};
 
-use super::super::file::{FileWindow, LogFile};
-use super::super::limits::{DEFINITION_BYTES, LimitExceeded, LimitKind};
 use super::block::{Block, DecodedBlock, MESSAGE_HEADER, chunk_header, message_header, parse_definition};
+use super::file::{FileWindow, LogFile};
 use super::{RECORD_HEADER, record_at, record_in_file};
+use crate::files::limits::DEFINITION_BYTES;
+use crate::files::{LimitExceeded, LimitKind};
 
 /// Channel (2 bytes) and size of the list (4) of a message index.
 const MESSAGE_INDEX_HEAD: usize = 6;

@@ -1,6 +1,7 @@
 //! MCAP container: positions of the messages of each channel, and the bytes of one block at a time.
 
 mod block;
+pub(crate) mod file;
 mod index;
 mod topic;
 mod unpack;
@@ -12,7 +13,7 @@ pub(super) use index::{ChannelRecord, ContainerIndex, MessagePosition};
 pub(super) use topic::TopicIndex;
 pub(super) use unpack::unpack_message;
 
-use super::file::{FileWindow, LogFile};
+use self::file::{FileWindow, LogFile};
 
 /// Every record starts with its opcode (1 byte) and the length of its body (8 bytes).
 const RECORD_HEADER: usize = 9;

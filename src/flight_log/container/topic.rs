@@ -1,4 +1,4 @@
-use super::super::file::LogFile;
+use super::file::LogFile;
 use super::index::{ContainerIndex, MessagePosition};
 
 /// Messages of one topic in the order of their log times. They are read in groups on demand, because the message

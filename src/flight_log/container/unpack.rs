@@ -3,8 +3,8 @@
 use std::borrow::Cow;
 use std::io::{ErrorKind, Read};
 
-use super::super::file::ZSTD_MAGIC;
-use super::super::limits::{LimitExceeded, LimitKind, LogLimits};
+use super::file::ZSTD_MAGIC;
+use crate::files::{LimitExceeded, LimitKind, LogLimits};
 
 /// Decompresses a chunk as far as possible, at most `claimed` bytes; the second value is the error that stopped it
 /// early.

@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 use super::super::LogError;
-use super::super::foreign;
+use crate::files::FileError;
+use crate::flight_log::log::foreign;
 
 /// Failure to convert a source; every message names the problem, its location and the remedy, the path last.
 #[derive(Debug, Error)]
@@ -12,6 +13,8 @@ pub enum ConvertError {
     /// The log or the rig could not be written, or a sensor's description is invalid.
     #[error(transparent)]
     Log(#[from] LogError),
+    #[error(transparent)]
+    File(#[from] FileError),
     #[error("cannot {action}: {source}: {}", path.display())]
     Io { action: &'static str, source: io::Error, path: PathBuf },
     #[error(

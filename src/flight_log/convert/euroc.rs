@@ -5,17 +5,19 @@ use std::io::{self, Read as _};
 use std::path::{Component, Path, PathBuf};
 
 use super::super::MessageTimes;
-use super::super::file::kind_of;
-use super::super::image_decoding::compressed_format;
-use super::super::limits::LogLimits;
 use super::ConvertError;
-use super::euroc_rig::{EUROC_GIMBAL, EUROC_GROUND_TRUTH, JOINT_TOPIC, pose_topic, rig_in};
-use super::euroc_sensor::{CameraSensor, IMU_TOPIC, image_topic, rig_of, sensor_pose};
+use super::euroc_sensor::{
+    CameraSensor, EUROC_GIMBAL, EUROC_GROUND_TRUTH, IMU_TOPIC, JOINT_TOPIC, image_topic, pose_topic, rig_in, rig_of,
+    sensor_pose,
+};
 use super::euroc_tables::{
     EurocSample, SHORTEST_IMU_STEP_NS, SHORTEST_STEP_NS, for_each_row, in_nanoseconds, read_images, read_imu,
     read_joints, read_poses,
 };
 use super::sink::LogSink;
+use crate::files::LogLimits;
+use crate::flight_log::container::file::kind_of;
+use crate::flight_log::images::decoding::compressed_format;
 use crate::sensors::Rig;
 
 /// Sensors with poses, the best ground truth first.

@@ -1,4 +1,5 @@
-//! Conversion of EuRoC's `sensor.yaml` to a rig with Kalibr's names.
+//! Rig of a EuRoC folder: its `sensor.yaml` files with Kalibr's names, and the rig that this program writes inside a
+//! folder for all that they cannot describe.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -6,14 +7,16 @@ use std::path::{Path, PathBuf};
 use nalgebra::Matrix4;
 use serde_json::Value;
 
-use super::super::LogError;
-use super::super::text::without_bom;
 use super::ConvertError;
 use super::sink::LogSink;
 use super::source_file::read_description;
 use crate::camera::CameraModel;
+use crate::files::FileError;
+use crate::files::limits::LINE_BYTES;
+use crate::flight_log::container::file::kind_of;
 use crate::geometry::{RigidTransform, seconds_from_ns};
-use crate::sensors::{CameraMount, CameraRig, ImuIntrinsics, ImuNoise, ImuRig, Rig};
+use crate::sensors::{CameraMount, CameraRig, GimbalRig, ImuIntrinsics, ImuNoise, ImuRig, Rig};
+use crate::text::without_bom;
 
 pub(super) const IMU_TOPIC: &str = "/imu0";
 
@@ -54,7 +57,7 @@ impl SensorFile {
         let text = if text.starts_with("%YAML:") { text.split_once('\n').map_or("", |(_, rest)| rest) } else { text };
         let document = serde_saphyr::from_str(text).map_err(|error| {
             let problem = error.to_string();
-            LogError::RigSyntax { problem: problem.lines().next().unwrap_or_default().to_owned(), path: path.clone() }
+            FileError::RigSyntax { problem: problem.lines().next().unwrap_or_default().to_owned(), path: path.clone() }
         })?;
         Ok(Some(Self { document, path }))
     }
@@ -64,7 +67,7 @@ impl SensorFile {
             None => format!("missing, expected {expected}"),
             Some(value) => format!("holds {value}, expected {expected}"),
         };
-        LogError::Rig { field: field.to_owned(), problem, path: self.path.clone() }.into()
+        FileError::Rig { field: field.to_owned(), problem, path: self.path.clone() }.into()
     }
 
     fn positive(&self, field: &str, expected: &str) -> Result<f64, ConvertError> {
@@ -202,7 +205,7 @@ fn camera_rig(
         &file.numbers("distortion_coefficients", "the coefficients of the lens")?,
         [width as usize, height as usize],
     )
-    .map_err(|error| LogError::Rig {
+    .map_err(|error| FileError::Rig {
         field: "intrinsics and distortion".to_owned(),
         problem: error.to_string(),
         path: file.path.clone(),
@@ -228,4 +231,82 @@ fn camera_rig(
         intrinsics_sigma: None,
         mask: None,
     })
+}
+
+/// Name of the rig in `mav0`.
+pub const EUROC_RIG: &str = "rig.yaml";
+/// Folder of the joint readings in `mav0`.
+pub const EUROC_GIMBAL: &str = "gimbal0";
+/// Folder of the ground truth in `mav0`.
+pub const EUROC_GROUND_TRUTH: &str = "state_groundtruth_estimate0";
+/// Topic of the joint readings in the log of such a folder.
+pub(super) const JOINT_TOPIC: &str = "/gimbal0/joint_states";
+/// Largest size of the rig.
+const LARGEST_BYTES: u64 = 4 * LINE_BYTES;
+
+/// Topic of the poses of a folder in its log.
+pub(super) fn pose_topic(folder: &str) -> String {
+    format!("/{folder}/pose")
+}
+
+/// The rig of a EuRoC folder made of `cameras` (`cam0`, `cam1`, … in this order): names and topics as the conversion of
+/// the folder gives them, samples of IMU and joints in IMU time and corrected.
+pub fn rig_of_euroc_folder(rig: &Rig, cameras: &[&CameraRig], has_joints: bool, has_ground_truth: bool) -> Rig {
+    let camera = |(number, camera): (usize, &&CameraRig)| {
+        let key = format!("cam{number}");
+        CameraRig {
+            topic: image_topic(&key),
+            frame_id: key.clone(),
+            use_log_time: false,
+            key,
+            ..CameraRig::clone(camera)
+        }
+    };
+    let gimbal = |gimbal: &GimbalRig| GimbalRig {
+        topic: has_joints.then(|| JOINT_TOPIC.to_owned()),
+        attitude: None,
+        use_log_time: false,
+        timeshift_gimbal_imu_s: 0.0,
+        ..gimbal.clone()
+    };
+    Rig {
+        imu: ImuRig {
+            topic: IMU_TOPIC.to_owned(),
+            accelerometer_topic: None,
+            use_log_time: false,
+            frame_id: "imu0".to_owned(),
+            intrinsics: ImuIntrinsics::default(),
+            ..rig.imu.clone()
+        },
+        cameras: cameras.iter().enumerate().map(camera).collect(),
+        gimbal: rig.gimbal.as_ref().map(gimbal),
+        ground_truth_topic: has_ground_truth.then(|| pose_topic(EUROC_GROUND_TRUTH)),
+        ground_truth_use_log_time: false,
+        ground_truth_lever_arm: None,
+        ..rig.clone()
+    }
+}
+
+/// Rig in the folder of the sensors; `None` without one, with a note if it cannot be used. Masks stay in the folder.
+pub(super) fn rig_in(root: &Path, sink: &mut LogSink<'_>) -> Option<Rig> {
+    let path = root.join(EUROC_RIG);
+    let metadata = std::fs::metadata(&path).ok()?;
+    let problem = if !metadata.is_file() {
+        format!("it is {}, expected a file", kind_of(&metadata))
+    } else if metadata.len() > LARGEST_BYTES {
+        format!("it has {} bytes, more than {LARGEST_BYTES}", metadata.len())
+    } else {
+        match Rig::from_file(&path) {
+            Ok(mut rig) => {
+                for camera in rig.cameras.iter_mut().filter(|camera| camera.mask.is_some()) {
+                    camera.mask = None;
+                    sink.note(format!("the mask of {} stays in {}", camera.key, root.display()));
+                }
+                return Some(rig);
+            }
+            Err(error) => error.to_string(),
+        }
+    };
+    sink.note(format!("{EUROC_RIG} cannot be used, so the rig is that of the files sensor.yaml: {problem}"));
+    None
 }

@@ -6,12 +6,12 @@ use std::path::Path;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-use super::super::limits::LINE_BYTES;
-use super::super::stamp_text::{StampUnit, WrittenStamp, is_heading, read_stamp};
-use super::super::text::without_bom;
 use super::ConvertError;
 use super::sink::LogSink;
+use crate::files::limits::LINE_BYTES;
+use crate::flight_log::stamps::text::{StampUnit, WrittenStamp, is_heading, read_stamp};
 use crate::geometry::RigidTransform;
+use crate::text::without_bom;
 
 /// Shortest step between two images or two poses.
 pub(super) const SHORTEST_STEP_NS: i64 = 500_000;

@@ -6,9 +6,9 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::super::container::{ChannelRecord, ContainerIndex, DecodedBlock};
-use super::super::file::LogFile;
 use super::ConvertError;
 use super::sink::{LogSink, Payload, SourceMessage};
+use crate::flight_log::container::file::LogFile;
 use crate::geometry::seconds_from_ns;
 
 /// Reason for the missing messages of a damaged block.

@@ -6,7 +6,6 @@
 
 mod error;
 mod euroc;
-mod euroc_rig;
 mod euroc_sensor;
 mod euroc_tables;
 mod mcap_segment;
@@ -21,24 +20,23 @@ mod sink;
 mod source_file;
 mod source_kind;
 mod sqlite;
-mod taken_records;
 
 use std::fs;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
+pub use self::euroc_sensor::{EUROC_GIMBAL, EUROC_GROUND_TRUTH, EUROC_RIG, rig_of_euroc_folder};
 pub use error::ConvertError;
-pub use euroc_rig::{EUROC_GIMBAL, EUROC_GROUND_TRUTH, EUROC_RIG, rig_of_euroc_folder};
 pub use options::{AutopilotLog, AutopilotLogKind, ConvertOptions, ForceAgreement, VideoClock};
 pub use report::{ConversionReport, ConvertedTopic};
 pub use source_kind::{SourceKind, source_kind};
 
+use self::options::TakenRecords;
 use super::{FlightLog, LogError, LogWriter, LogWriterOptions};
 use crate::geometry::seconds_from_ns;
 use crate::sensors::Rig;
 use recording::VideoFacts;
 use sink::LogSink;
-use taken_records::TakenRecords;
 
 /// Converts `source` into the log `output`, with a rig next to it if the source has a calibration; `progress` is called
 /// with the completed fraction, from 0 to 1.
@@ -106,7 +104,7 @@ pub fn convert_with(
             )),
             Ok(_) => report.notes.extend(assumed),
             Err(_) => {
-                super::output::write_file(&path, text.as_bytes()).map_err(|source| LogError::Io {
+                crate::files::output::write_file(&path, text.as_bytes()).map_err(|source| LogError::Io {
                     action: "write the rig",
                     source,
                     path: path.clone(),

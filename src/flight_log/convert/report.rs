@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use serde::{Serialize, Serializer};
 
 use super::{ForceAgreement, VideoClock};
-use crate::flight_log::text::{printable, shortened};
+use crate::text::{printable, shortened};
 
 /// Result of one topic of a source.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]

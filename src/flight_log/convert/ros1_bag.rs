@@ -6,11 +6,11 @@ use std::collections::BTreeMap;
 use std::io::{self, Read};
 use std::path::Path;
 
-use super::super::file::LogFile;
-use super::super::limits::LogLimits;
 use super::ConvertError;
 use super::ros1_record::{BagRecord, record_at, record_in_file, text_field};
 use super::sink::{LogSink, Payload, SourceMessage};
+use crate::files::LogLimits;
+use crate::flight_log::container::file::LogFile;
 
 /// First bytes of a bag of version 2.0.
 pub(super) const MAGIC: &[u8] = b"#ROSBAG V2.0\n";

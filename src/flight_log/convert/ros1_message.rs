@@ -4,7 +4,7 @@
 //! and stamps are unsigned. Otherwise the supported message types have the same fields in the same order in both.
 
 use super::super::MessageKind;
-use super::super::cdr::CdrWriter;
+use crate::flight_log::messages::cdr::CdrWriter;
 
 /// Field, or several fields of one kind.
 #[derive(Clone, Copy, Debug)]

@@ -1,6 +1,6 @@
 //! Records of a ROS 1 bag, format 2.0: a header of named fields, and data.
 
-use super::super::file::LogFile;
+use crate::flight_log::container::file::LogFile;
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BagRecord<'a> {

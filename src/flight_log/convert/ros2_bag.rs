@@ -8,12 +8,12 @@ use std::path::{Component, Path, PathBuf};
 use serde_json::Value;
 use tempfile::NamedTempFile;
 
-use super::super::file::{LogFile, unpacked_name};
-use super::super::limits::LogLimits;
 use super::sink::LogSink;
 use super::source_file::{read_description, with_suffix};
 use super::sqlite::BagDatabase;
 use super::{ConvertError, mcap_segment, sqlite};
+use crate::files::LogLimits;
+use crate::flight_log::container::file::{LogFile, unpacked_name};
 
 /// Number of bytes that are copied at a time.
 const COPIED_BYTES: usize = 1 << 20;

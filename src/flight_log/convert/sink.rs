@@ -6,14 +6,14 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use super::super::container::unpack_message;
-use super::super::limits::{LimitExceeded, LimitKind, LogLimits};
 use super::super::messages::{read_video_packet, stamp_ns};
-use super::super::text::without_signed_zeros;
 use super::super::writer::MessageType;
 use super::super::{LogWriter, MessageKind, MessageTimes};
+use super::options::TakenRecords;
 use super::ros1_message::cdr_from_ros1;
-use super::taken_records::TakenRecords;
 use super::{ConversionReport, ConvertError, ConvertedTopic, ForceAgreement, VideoClock};
+use crate::files::{LimitExceeded, LimitKind, LogLimits};
+use crate::text::without_signed_zeros;
 
 /// Number of characters shown of a too long name.
 const SHOWN_CHARS: usize = 48;

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::error::ConvertError;
-use crate::flight_log::limits::DESCRIPTION_BYTES;
+use crate::files::limits::DESCRIPTION_BYTES;
 
 /// Reads a small text file; a larger one is no description of a source.
 pub(super) fn read_description(path: &Path, action: &'static str) -> Result<String, ConvertError> {

@@ -4,14 +4,14 @@ use std::fs;
 use std::io::Read as _;
 use std::path::Path;
 
-use super::super::LogLimits;
-use super::super::file::{LogFile, ZSTD_MAGIC, kind_of, unpacked_name};
-use super::super::foreign;
 use super::super::log::lfs_pointer;
-use super::super::text::log_name;
 use super::error::ConvertError;
 use super::options::AutopilotLogKind;
 use super::{euroc, recording, ros1_bag, ros2_bag};
+use crate::files::LogLimits;
+use crate::flight_log::container::file::{LogFile, ZSTD_MAGIC, kind_of, unpacked_name};
+use crate::flight_log::log::foreign;
+use crate::text::log_name;
 
 /// Kind of a recording that `dcvins convert` reads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

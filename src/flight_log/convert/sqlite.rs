@@ -12,10 +12,10 @@ use rusqlite::limits::Limit;
 use rusqlite::types::ValueRef;
 use rusqlite::{Connection, OpenFlags, Row};
 
-use super::super::file::kind_of;
-use super::super::limits::{LimitExceeded, LimitKind, LogLimits};
 use super::ConvertError;
 use super::sink::{LogSink, Payload, SourceMessage};
+use crate::files::{LimitExceeded, LimitKind, LogLimits};
+use crate::flight_log::container::file::kind_of;
 
 /// Steps of SQLite's virtual machine between two checks of the number of steps.
 const STEPS_PER_LOOK: i32 = 100_000;

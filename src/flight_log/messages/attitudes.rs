@@ -2,7 +2,7 @@
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-use super::super::cdr::{CdrError, CdrReader};
+use super::cdr::{CdrError, CdrReader};
 use super::{MessageKind, read_header, read_px4_stamp};
 use crate::sensors::AttitudeValue;
 

@@ -1,122 +1,51 @@
 //! Camera models by `CameraInfo`: intrinsics of the sensor, region of interest and binning of its images.
 
-use std::fmt::{Display, Formatter};
-
 use super::super::FlightLog;
-use super::super::image_decoding::image_size;
 use super::super::messages::{self, CameraInfoMessage, MessageKind};
 use crate::camera::CameraModel;
+use crate::files::rig::camera_facts::{PublishedCamera, SensorWindow};
+use crate::flight_log::images::decoding::image_size;
 
 /// Number of unreadable images after which a topic's size is unknown; a video begins with a keyframe among them.
 const MOST_TRIED: usize = 300;
 
-/// Part of a sensor in an image: a region, of whose pixels blocks are joined to one pixel of the image.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct SensorWindow {
-    /// Column and row of the region's first pixel.
-    offset_px: [usize; 2],
-    /// Width and height of the region.
-    size_px: [usize; 2],
-    /// Width and height of a block.
-    binning_px: [usize; 2],
-    /// True if the region is not the whole sensor.
-    is_cropped: bool,
+/// Region and binning of a message; a region without a size ends at the end of the sensor.
+fn window_of(info: &CameraInfoMessage) -> Result<SensorWindow, String> {
+    let sensor_px = [info.width, info.height];
+    let axis = |axis: usize| {
+        let (offset, size) = (info.region_offset_px[axis], info.region_size_px[axis]);
+        let size = if size == 0 { sensor_px[axis].saturating_sub(offset) } else { size };
+        let fits = size > 0 && offset.checked_add(size).is_some_and(|end| end <= sensor_px[axis]);
+        let binning = info.binning_px[axis].max(1);
+        (fits && size >= binning).then_some([offset, size, binning])
+    };
+    let ([x, width, across], [y, height, down]) = axis(0).zip(axis(1)).ok_or_else(|| {
+        let ([x, y], [width, height], [across, down]) = (info.region_offset_px, info.region_size_px, info.binning_px);
+        format!(
+            "its region of interest (roi) of {width}×{height} pixels at ({x}, {y}) with binning {across}×{down} is no \
+             part of its {}×{} pixels",
+            info.width, info.height
+        )
+    })?;
+    let is_cropped = [width, height] != sensor_px;
+    Ok(SensorWindow { offset_px: [x, y], size_px: [width, height], binning_px: [across, down], is_cropped })
 }
 
-impl SensorWindow {
-    /// Region and binning of a message; a region without a size ends at the end of the sensor.
-    fn of(info: &CameraInfoMessage) -> Result<Self, String> {
-        let sensor_px = [info.width, info.height];
-        let axis = |axis: usize| {
-            let (offset, size) = (info.region_offset_px[axis], info.region_size_px[axis]);
-            let size = if size == 0 { sensor_px[axis].saturating_sub(offset) } else { size };
-            let fits = size > 0 && offset.checked_add(size).is_some_and(|end| end <= sensor_px[axis]);
-            let binning = info.binning_px[axis].max(1);
-            (fits && size >= binning).then_some([offset, size, binning])
-        };
-        let ([x, width, across], [y, height, down]) = axis(0).zip(axis(1)).ok_or_else(|| {
-            let ([x, y], [width, height], [across, down]) = (info.region_offset_px, info.region_size_px, info.binning_px);
-            format!(
-                "its region of interest (roi) of {width}×{height} pixels at ({x}, {y}) with binning {across}×{down} is no \
-                 part of its {}×{} pixels",
-                info.width, info.height
-            )
-        })?;
-        let is_cropped = [width, height] != sensor_px;
-        Ok(Self { offset_px: [x, y], size_px: [width, height], binning_px: [across, down], is_cropped })
-    }
-
-    /// Width and height of the images in pixels.
-    fn image_px(&self) -> [usize; 2] {
-        [0, 1].map(|axis| self.size_px[axis] / self.binning_px[axis])
-    }
-
-    fn without_binning(self) -> Self {
-        Self { binning_px: [1, 1], ..self }
-    }
-
-    /// True if the images have all pixels of the sensor.
-    fn is_whole(&self) -> bool {
-        !self.is_cropped && self.binning_px == [1, 1]
-    }
-
-    /// Model of the images by the model of the sensor. Pixel centres are at whole numbers, so that the first of two
-    /// joined pixels is half a pixel before their centre.
-    pub(crate) fn applied_to(&self, sensor: &CameraModel) -> CameraModel {
-        let [fx, fy, cx, cy] = sensor.intrinsics_px;
-        let binning = self.binning_px.map(|side| side as f64);
-        let center = |axis: usize, px: f64| (px - self.offset_px[axis] as f64 + 0.5) / binning[axis] - 0.5;
-        CameraModel {
-            intrinsics_px: [fx / binning[0], fy / binning[1], center(0, cx), center(1, cy)],
-            resolution_px: self.image_px(),
-            ..sensor.clone()
-        }
-    }
-}
-
-/// `region 320×240 at (100, 50), binning 2×2`.
-impl Display for SensorWindow {
-    fn fmt(&self, out: &mut Formatter<'_>) -> std::fmt::Result {
-        let ([x, y], [width, height], [across, down]) = (self.offset_px, self.size_px, self.binning_px);
-        let comma = if self.is_cropped && self.binning_px != [1, 1] { ", " } else { "" };
-        if self.is_cropped {
-            write!(out, "region {width}×{height} at ({x}, {y}){comma}")?;
-        }
-        if self.binning_px != [1, 1] {
-            write!(out, "binning {across}×{down}")?;
-        }
-        Ok(())
-    }
-}
-
-/// Camera by the `CameraInfo` of a log.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct PublishedCamera {
-    /// Model of the whole sensor.
-    pub(crate) sensor: CameraModel,
-    /// Part of the sensor in the images; `None` if it is the whole sensor.
-    pub(crate) window: Option<SensorWindow>,
-    /// Model of the images.
-    pub(crate) image: CameraModel,
-}
-
-impl PublishedCamera {
-    /// Camera of a message whose images have a size, if it is known. Region and binning apply if the images agree with
-    /// them: some drivers state a binning with intrinsics that are binned already.
-    fn of(info: &CameraInfoMessage, image_px: Option<[usize; 2]>) -> Result<Self, String> {
-        let sensor = model_of(info)?;
-        let stated = SensorWindow::of(info)?;
-        let candidates = [stated, stated.without_binning()];
-        let agrees = |window: &&SensorWindow| image_px.is_none_or(|image_px| window.image_px() == image_px);
-        let window = match candidates.iter().find(agrees) {
-            Some(window) => Some(*window),
-            None if image_px == Some(sensor.resolution_px) => None,
-            None => Some(stated),
-        };
-        let window = window.filter(|window| !window.is_whole());
-        let image = window.map_or_else(|| sensor.clone(), |window| window.applied_to(&sensor));
-        Ok(Self { sensor, window, image })
-    }
+/// Camera of a message whose images have a size, if it is known. Region and binning apply if the images agree with
+/// them: some drivers state a binning with intrinsics that are binned already.
+fn camera_of(info: &CameraInfoMessage, image_px: Option<[usize; 2]>) -> Result<PublishedCamera, String> {
+    let sensor = model_of(info)?;
+    let stated = window_of(info)?;
+    let candidates = [stated, stated.without_binning()];
+    let agrees = |window: &&SensorWindow| image_px.is_none_or(|image_px| window.image_px() == image_px);
+    let window = match candidates.iter().find(agrees) {
+        Some(window) => Some(*window),
+        None if image_px == Some(sensor.resolution_px) => None,
+        None => Some(stated),
+    };
+    let window = window.filter(|window| !window.is_whole());
+    let image = window.map_or_else(|| sensor.clone(), |window| window.applied_to(&sensor));
+    Ok(PublishedCamera { sensor, window, image })
 }
 
 impl FlightLog {
@@ -131,7 +60,7 @@ impl FlightLog {
             if self.topic(&topic).is_some_and(|info| info.kind == Some(MessageKind::CameraInfo)) {
                 let info = self.find_message(&topic, |data| messages::read_camera_info(data).ok());
                 let info = info.ok_or_else(|| format!("no readable message on {topic}"))?;
-                let published = PublishedCamera::of(&info, self.image_size(image_topic));
+                let published = camera_of(&info, self.image_size(image_topic));
                 return published.map_err(|problem| format!("{topic}: {problem}"));
             }
             tried.push(topic);

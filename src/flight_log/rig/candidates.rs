@@ -2,12 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use super::super::text::log_name;
 use super::super::{FlightLog, MessageKind};
-use super::document::Document;
-use super::kalibr;
+use crate::files::rig::Document;
+use crate::files::rig::kalibr;
 use crate::sensors::{CameraMount, Rig};
-use crate::text::counted;
+use crate::text::{counted, log_name};
 
 /// Largest number of rig files that are read in a folder.
 const MAX_FILES: usize = 60;

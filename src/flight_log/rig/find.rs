@@ -1,27 +1,12 @@
 use std::path::{Path, PathBuf};
 
 use super::super::{FlightLog, LogError};
-use super::camera_facts::{CameraFacts, NoFacts};
-use super::camera_info::PublishedCamera;
-use super::document::Document;
-use super::mask::{Attached, InFolder};
-use super::read;
-use super::{kalibr, keys};
+use crate::files::FileError;
+use crate::files::rig::camera_facts::{CameraFacts, PublishedCamera};
+use crate::files::rig::{Document, RigWithUnusedKeys, from_document, from_file};
 use crate::sensors::Rig;
 
 impl Rig {
-    /// Reads a rig file: the schema of this program, or Kalibr's `camchain-imucam.yaml` with `imu.yaml` in the same
-    /// folder.
-    pub fn from_file(path: &Path) -> Result<Self, LogError> {
-        from_file(path, &NoFacts).map(|(rig, _)| rig)
-    }
-
-    /// Parses the text of a rig in the schema of this program; `file` is named in errors.
-    pub fn from_yaml(text: &str, file: &Path) -> Result<Self, LogError> {
-        let facts = InFolder { facts: &NoFacts, folder: folder_of(file) };
-        from_document(&Document::parse(text.to_owned(), file)?, &facts).map(|(rig, _)| rig)
-    }
-
     /// Finds the rig of a log: the file given by the user, else the one next to the log, else the one attached to it.
     /// Missing intrinsics and image rates are taken from the log.
     pub fn for_log(log: &FlightLog, explicit: Option<&Path>) -> Result<Self, LogError> {
@@ -56,12 +41,9 @@ impl Rig {
         let Some(path) = explicit else { return Ok(None) };
         let [given, expected] = [&truth, self].map(|rig| joints(rig, key).unwrap_or(0));
         let problem = format!("{given} joints in the ground truth, {expected} in the rig '{}'", self.name);
-        Err(LogError::Rig { field: key.to_owned(), problem, path: path.to_owned() })
+        Err(FileError::Rig { field: key.to_owned(), problem, path: path.to_owned() }.into())
     }
 }
-
-/// Rig with the paths of known but unused keys of its file.
-type RigWithUnusedKeys = (Rig, Vec<String>);
 
 fn find(
     log: &FlightLog,
@@ -70,55 +52,14 @@ fn find(
     ending: &str,
 ) -> Result<Option<RigWithUnusedKeys>, LogError> {
     if let Some(path) = explicit {
-        return from_file(path, log).map(Some);
+        return Ok(Some(from_file(path, log)?));
     }
     if beside.is_file() {
-        return from_file(beside, log).map(Some);
+        return Ok(Some(from_file(beside, log)?));
     }
     let Some((name, content)) = log.attachment(ending) else { return Ok(None) };
     let file = PathBuf::from(format!("{} (attachment {name})", log.path().display()));
-    from_document(&Document::from_bytes(content, &file)?, &Attached(log)).map(Some)
-}
-
-fn from_file(path: &Path, facts: &dyn CameraFacts) -> Result<RigWithUnusedKeys, LogError> {
-    from_document(&Document::read(path)?, &InFolder { facts, folder: folder_of(path) })
-}
-
-/// Folder of the files next to a rig.
-fn folder_of(rig: &Path) -> &Path {
-    rig.parent().unwrap_or(rig)
-}
-
-fn from_document(document: &Document, facts: &dyn CameraFacts) -> Result<RigWithUnusedKeys, LogError> {
-    let file = &document.file;
-    let stem = file.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    let name = stem.split('.').next().unwrap_or_default();
-    let with_line = |error| document.with_line(error);
-    let root = document.root();
-    if !kalibr::is_camera_chain(&document.value) {
-        let rig = read::read_rig(&root, name, facts).map_err(with_line)?;
-        return Ok((rig, keys::check_rig(&document.value, file).map_err(with_line)?));
-    }
-    if root.field("imu0").is_present() {
-        let rig = kalibr::read_camera_chain(&root, &root, name, facts).map_err(with_line)?;
-        return Ok((rig, keys::check_rig(&document.value, file).map_err(with_line)?));
-    }
-    let candidates = kalibr::imu_files(file);
-    let Some(imu_file) = candidates.iter().find(|candidate| candidate.is_file()) else {
-        let names: Vec<String> = candidates
-            .iter()
-            .filter_map(|path| path.file_name())
-            .map(|name| name.to_string_lossy().into_owned())
-            .collect();
-        let expected = format!("the IMU in one of {} next to this camera chain", names.join(", "));
-        return Err(root.field("imu0").unexpected(&expected));
-    };
-    let imu = Document::read(imu_file)?;
-    let with_line = |error| imu.with_line(document.with_line(error));
-    let rig = kalibr::read_camera_chain(&root, &imu.root(), name, facts).map_err(with_line)?;
-    let mut unused = keys::check_rig(&document.value, file).map_err(with_line)?;
-    unused.extend(keys::check_imu_file(&imu.value, imu_file).map_err(with_line)?);
-    Ok((rig, unused))
+    Ok(Some(from_document(&Document::from_bytes(content, &file)?, &Attached(log))?))
 }
 
 impl CameraFacts for FlightLog {
@@ -129,4 +70,26 @@ impl CameraFacts for FlightLog {
     fn rate_hz(&self, image_topic: &str) -> Option<f64> {
         self.topic(image_topic).map(|info| info.rate_hz)
     }
+}
+
+/// Facts of a log, and its attachments.
+struct Attached<'a>(&'a FlightLog);
+
+impl CameraFacts for Attached<'_> {
+    fn published(&self, image_topic: &str) -> Result<PublishedCamera, String> {
+        self.0.published(image_topic)
+    }
+
+    fn rate_hz(&self, image_topic: &str) -> Option<f64> {
+        self.0.rate_hz(image_topic)
+    }
+
+    fn file_beside_rig(&self, name: &str) -> Result<Vec<u8>, String> {
+        let attached = self.0.attachment(file_name(name)).map(|(_, content)| content);
+        attached.ok_or_else(|| format!("the log has no readable attachment {:?}", file_name(name)))
+    }
+}
+
+fn file_name(name: &str) -> &str {
+    name.rsplit(['/', '\\']).next().unwrap_or(name)
 }

@@ -4,13 +4,15 @@ use std::sync::Arc;
 
 use nalgebra::UnitQuaternion;
 
-use super::super::attitude::{self, MAX_VEHICLE_GAP_NS, TransformMerge, TransformPath, rotation_between};
 use super::super::log::relative_ns;
 use super::super::messages::{self, MessageKind};
-use super::super::stamp_clock::StampClock;
 use super::super::{FlightLog, LogError, LogWarning, Magnitude, WarningKind};
 use super::ordered::{Decoder, Lookup, MessageSource, OrderedSamples};
 use super::read_context::{ReadContext, Refusal};
+use crate::files::FileError;
+use crate::flight_log::joints::attitude;
+use crate::flight_log::joints::attitude::{MAX_VEHICLE_GAP_NS, TransformMerge, TransformPath, rotation_between};
+use crate::flight_log::stamps::clock::StampClock;
 use crate::geometry::{ns_from_seconds, seconds_from_ns};
 use crate::gimbal::{InverseChain, InverseSolution};
 use crate::sensors::{AttitudeMessage, AttitudeSource, AttitudeValue, GimbalRig, JointSample};
@@ -117,7 +119,7 @@ impl AttitudeJoints {
                 Some(Lookup::new(OrderedSamples::new(log, vehicle, from_ns, false, decoder)))
             }
         };
-        let inverse = gimbal.inverse_chain().ok_or_else(|| LogError::Rig {
+        let inverse = gimbal.inverse_chain().ok_or_else(|| FileError::Rig {
             field: "gimbal.links".to_owned(),
             problem: format!("{} links, expected one to three with gimbal.source", gimbal.joints.len()),
             path: log.path().to_owned(),

@@ -3,18 +3,18 @@
 use std::sync::Arc;
 
 use super::super::grey_levels::GreyLevels;
-use super::super::grey_sampling::grey_levels_of_topic;
-use super::super::image_copies::CopyJudge;
-use super::super::image_decoding::decode_image;
-use super::super::image_problem::ImageProblem;
 use super::super::log::relative_ns;
 use super::super::messages::{self, MessageKind};
-use super::super::stamp_clock::StampClock;
 use super::super::video::PictureStream;
 use super::super::{FlightLog, LogError, WarningKind};
 use super::gaps::GapWatch;
 use super::ordered::{Decoder, MessageSource, OrderedSamples};
 use super::read_context::{ReadContext, Refusal};
+use crate::files::image_file::ImageProblem;
+use crate::flight_log::images::copies::CopyJudge;
+use crate::flight_log::images::decoding::decode_image;
+use crate::flight_log::images::grey_sampling::grey_levels_of_topic;
+use crate::flight_log::stamps::clock::StampClock;
 use crate::geometry::{ns_from_seconds, seconds_from_ns};
 use crate::sensors::{CameraRig, GrayImage};
 

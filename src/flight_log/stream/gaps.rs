@@ -1,8 +1,8 @@
 //! Intervals without messages of a topic, by the spacing of its stamps.
 
-use super::super::spacing::Spacing;
 use super::super::{LogWarning, Magnitude, WarningKind};
 use super::read_context::ReadContext;
+use crate::flight_log::stamps::spacing::Spacing;
 use crate::geometry::seconds_from_ns;
 
 /// Number of stamps from which the usual spacing is taken; a batch has a few.

@@ -2,8 +2,7 @@
 
 use super::super::{FlightLog, LogError, WarningKind};
 use super::gaps::GapWatch;
-use super::imu::ImuStream;
-use super::imu_buffer::FrameImuBuffer;
+use super::imu::{FrameImuBuffer, ImuStream};
 use super::read_context::ReadContext;
 use crate::geometry::ns_from_seconds;
 use crate::sensors::{GimbalImuRig, ImuSample};

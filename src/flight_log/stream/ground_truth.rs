@@ -2,10 +2,10 @@
 
 use super::super::log::relative_ns;
 use super::super::messages::{self, MessageKind};
-use super::super::stamp_clock::StampClock;
 use super::super::{FlightLog, WarningKind};
 use super::ordered::{Decoder, Lookup, MessageSource, OrderedSamples};
 use super::read_context::{ReadContext, Refusal};
+use crate::flight_log::stamps::clock::StampClock;
 use crate::geometry::RigidTransform;
 use crate::sensors::{NEAREST_POSE_NS, PoseSample, Rig};
 

@@ -2,14 +2,14 @@
 
 use std::sync::Arc;
 
-use super::super::joint_merge::{JointMerge, JointReading};
 use super::super::log::relative_ns;
 use super::super::messages::{self, JointMessage, MessageKind};
-use super::super::stamp_clock::StampClock;
 use super::super::{FlightLog, LogError, WarningKind};
 use super::attitude::AttitudeJoints;
 use super::ordered::{Decoder, MessageSource, OrderedSamples};
 use super::read_context::{ReadContext, Refusal};
+use crate::flight_log::joints::{JointMerge, JointReading};
+use crate::flight_log::stamps::clock::StampClock;
 use crate::geometry::ns_from_seconds;
 use crate::sensors::{GimbalRig, JointSample};
 

@@ -3,13 +3,11 @@
 pub(crate) mod angle_fit;
 mod attitude;
 mod camera;
-mod drops;
 mod frames;
 mod gaps;
 mod gimbal_imu;
 mod ground_truth;
 mod imu;
-mod imu_buffer;
 mod joint_angles;
 mod joint_topic;
 mod ordered;
@@ -23,11 +21,12 @@ use std::sync::mpsc::{Receiver, sync_channel};
 use std::thread::JoinHandle;
 
 use self::frames::FrameSource;
+pub use self::frames::SensorFrame;
 pub use self::joint_angles::nominal_joint_sigma_rad;
 pub use self::sensor_samples::{
     RecordedImage, SensorSamples, ground_truth_poses, imu_samples, joint_samples, recorded_images,
 };
-use super::{FlightLog, LogError, LogWarning, SensorFrame, WarningKind};
+use super::{FlightLog, LogError, LogWarning, WarningKind};
 use crate::sensors::Rig;
 
 /// Number of frames read ahead; one takes about half a megabyte.

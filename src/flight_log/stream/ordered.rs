@@ -6,8 +6,7 @@ use super::super::container::{MessagePosition, TopicIndex};
 use super::super::log::relative_ns;
 use super::super::messages::MessageKind;
 use super::super::video::keyframe_before;
-use super::drops::Drops;
-use super::read_context::{ReadContext, Refusal};
+use super::read_context::{Drops, ReadContext, Refusal};
 use crate::geometry::seconds_from_ns;
 
 /// Messages out of order by up to this are sorted; later ones are dropped.

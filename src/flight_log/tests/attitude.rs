@@ -2,9 +2,9 @@
 
 use nalgebra::UnitQuaternion;
 
-use super::super::cdr::CdrWriter;
 use super::super::messages::MessageKind;
 use super::*;
+use crate::flight_log::messages::cdr::CdrWriter;
 use crate::geometry::{seconds_from_ns, wrap_angle};
 use crate::sensors::{BodyAxes, JointAngles, NamedAxes};
 

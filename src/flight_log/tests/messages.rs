@@ -1,16 +1,16 @@
-use super::super::cdr::{CdrReader, CdrWriter};
 use super::super::grey_levels::Narrowing;
-use super::super::image_decoding::{self, WideValues};
-use super::super::image_problem::ImageProblem;
-use super::super::limits::LogLimits;
 use super::super::messages::{self, MessageKind};
 use super::*;
+use crate::files::LogLimits;
+use crate::files::image_file::ImageProblem;
+use crate::flight_log::images::decoding::{self, WideValues};
+use crate::flight_log::messages::cdr::{CdrReader, CdrWriter};
 use crate::flight_log::writer::testing as encode;
 
 /// Image of a message within the usual limits, or a description of the problem.
 fn decode_image(kind: MessageKind, message: &[u8], narrowing: Narrowing) -> Result<GrayImage, String> {
     let limits = LogLimits::default();
-    image_decoding::decode_image(kind, message, narrowing, &limits, None).map_err(|problem| problem.to_string())
+    decoding::decode_image(kind, message, narrowing, &limits, None).map_err(|problem| problem.to_string())
 }
 
 /// Converts the little-endian bytes of a message with 4- and 8-byte numbers after a header to big-endian.
@@ -110,12 +110,12 @@ fn values_of_wide_images_are_read_before_their_conversion() {
     for (kind, message) in
         [(MessageKind::Image, encode::image(0, "camera", [2, 2], "16UC1", &bytes)), png(gray.into()), png(color.into())]
     {
-        let found = image_decoding::wide_values(kind, &message, &LogLimits::default());
+        let found = decoding::wide_values(kind, &message, &LogLimits::default());
         assert_eq!(found, Some(WideValues::Of(values.to_vec())));
         assert_eq!(decode_image(kind, &message, stretched).unwrap().pixels, [0, 16, 239, 255]);
         assert_eq!(decode_image(kind, &message, Narrowing::default()).unwrap().pixels, [0, 115, 119, 255]);
     }
-    let wide_values = |message: &[u8]| image_decoding::wide_values(MessageKind::Image, message, &LogLimits::default());
+    let wide_values = |message: &[u8]| decoding::wide_values(MessageKind::Image, message, &LogLimits::default());
     assert_eq!(wide_values(&encode::image(0, "camera", [2, 2], "mono8", &[1, 2, 3, 4])), Some(WideValues::Narrow));
     assert_eq!(wide_values(&encode::image(0, "camera", [2, 2], "mono16", &[1, 2, 3, 4])), None);
 }
@@ -191,7 +191,7 @@ fn an_image_is_not_decoded_when_its_header_claims_too_much() {
         let expect = |data: &[u8], expected_px: Option<[usize; 2]>| {
             let message = encode::compressed_image(0, "camera", "", data);
             let (kind, narrowing, limits) = (MessageKind::CompressedImage, Narrowing::default(), LogLimits::default());
-            image_decoding::decode_image(kind, &message, narrowing, &limits, expected_px)
+            decoding::decode_image(kind, &message, narrowing, &limits, expected_px)
         };
         assert!(expect(&data, Some([WIDTH, HEIGHT])).is_ok());
         assert_eq!(expect(&data, Some([1, 1])).unwrap_err(), ImageProblem::OtherResolution([WIDTH, HEIGHT]));

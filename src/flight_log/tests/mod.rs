@@ -123,7 +123,7 @@ impl Flight {
     }
 }
 
-pub(super) const RIG: &str = "\
+pub(crate) const RIG: &str = "\
 rig_version: 1
 name: test
 gravity: 9.81

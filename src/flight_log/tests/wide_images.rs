@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::flight_log::ImageReader;
-use crate::flight_log::grey_sampling::grey_levels_of_topic;
+use crate::flight_log::images::grey_sampling::grey_levels_of_topic;
 use crate::flight_log::messages::MessageKind;
 use crate::flight_log::writer::LogCompression;
 

@@ -7,9 +7,9 @@ use std::path::Path;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use super::super::LogError;
-use super::super::stamp_text::{StampUnit, WrittenStamp, is_heading, read_stamp};
-use super::super::text::{shortened, without_bom};
 use super::RecordedPose;
+use crate::flight_log::stamps::text::{StampUnit, WrittenStamp, is_heading, read_stamp};
+use crate::text::{shortened, without_bom};
 
 /// Largest file: an hour of poses in steps of 1 ms, with about 100 bytes each.
 const MAX_BYTES: u64 = 512 << 20;

@@ -1,6 +1,7 @@
 //! Trajectories of other programs and positions of receivers: files in the formats of TUM and EuRoC, and topics of a log.
 
 mod file;
+pub(crate) mod geodesy;
 #[cfg(test)]
 mod tests;
 mod topic;

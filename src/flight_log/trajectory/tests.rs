@@ -2,7 +2,7 @@ use nalgebra::Vector3;
 use tempfile::TempDir;
 
 use super::read_trajectory_file;
-use crate::flight_log::cdr::CdrWriter;
+use crate::flight_log::messages::cdr::CdrWriter;
 use crate::flight_log::{FlightLog, LogWriter, LogWriterOptions, MessageTimes, MessageType};
 use crate::geometry::{RigidTransform, so3};
 

@@ -2,12 +2,12 @@
 
 use nalgebra::Vector3;
 
-use super::super::cdr::{CdrError, CdrReader};
-use super::super::geodesy::Geodetic;
 use super::super::messages::{self, MessageKind};
-use super::super::stamp_clock::StampClock;
 use super::super::{FlightLog, LogError};
 use super::RecordedPose;
+use super::geodesy::Geodetic;
+use crate::flight_log::messages::cdr::{CdrError, CdrReader};
+use crate::flight_log::stamps::clock::StampClock;
 
 /// Message types of a trajectory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

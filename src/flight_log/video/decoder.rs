@@ -4,10 +4,10 @@ use std::sync::Once;
 
 use rust_h264::nal::NalUnitType;
 
-use super::super::image_problem::{ImageProblem, check_resolution, unreadable};
-use super::super::limits::LogLimits;
-use super::codec::VideoCodec;
 use super::frame_numbers::FrameNumbers;
+use crate::files::LogLimits;
+use crate::files::image_file::{ImageProblem, check_resolution, unreadable};
+use crate::flight_log::messages::VideoCodec;
 use crate::sensors::GrayImage;
 
 /// Decodes the messages of one stream in order.

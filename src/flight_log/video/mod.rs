@@ -3,19 +3,14 @@
 //! A frame depends on those before it, back to a keyframe. Messages are decoded in the order of the log; after a
 //! damaged or missing message, frames are rejected up to the next keyframe, because they would be wrong.
 
-mod bits;
-pub(super) mod codec;
 mod decoder;
 mod frame_numbers;
 mod picture_stream;
-mod stretches;
 #[cfg(test)]
 pub(super) mod tests;
 
-pub(crate) use codec::VideoCodec;
 pub(crate) use decoder::VideoDecoder;
-pub(crate) use picture_stream::PictureStream;
-pub(crate) use stretches::{MissingPictures, missing_pictures};
+pub(crate) use picture_stream::{MissingPictures, PictureStream, missing_pictures};
 
 use super::FlightLog;
 use super::container::{BlockCache, TopicIndex};

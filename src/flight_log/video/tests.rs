@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 
 use serde::Deserialize;
 
-use super::super::limits::{LimitSetting, LogLimits};
-use super::{VideoCodec, VideoDecoder};
+use super::VideoDecoder;
+use crate::files::{LimitSetting, LogLimits};
+use crate::flight_log::messages::VideoCodec;
 use crate::geometry::SplitMix64;
 
 /// Messages of a stream, and the CRC-32 of each decoded frame's gray values.

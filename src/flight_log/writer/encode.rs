@@ -2,8 +2,8 @@
 
 use nalgebra::{Matrix6, UnitQuaternion, Vector3};
 
-use super::super::cdr::CdrWriter;
 use crate::camera::{CameraModel, Distortion};
+use crate::flight_log::messages::cdr::CdrWriter;
 use crate::geometry::RigidTransform;
 
 /// Starts a message with a header.

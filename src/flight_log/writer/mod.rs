@@ -1,6 +1,7 @@
 //! Writer of flight logs: MCAP with CDR messages and their definitions, in the layout of ROS 2's recorder.
 
 mod encode;
+pub(super) mod excerpt;
 mod protobuf;
 mod results;
 mod schemas;
@@ -18,9 +19,9 @@ use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, Compression, WriteOptions, Writer};
 use nalgebra::{UnitQuaternion, Vector3};
 
-use super::output::{OutputFile, StagedFile};
 use super::{LogError, MessageKind};
 use crate::camera::CameraModel;
+use crate::files::output::{OutputFile, StagedFile};
 use crate::geometry::RigidTransform;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

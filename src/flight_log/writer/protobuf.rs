@@ -226,7 +226,7 @@ pub(super) fn poses_in_frame<'a>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::flight_log::protobuf::{ProtobufReader, ProtobufValue};
+    use crate::flight_log::messages::protobuf::{ProtobufReader, ProtobufValue};
 
     /// Fields with bytes of a message, by their numbers.
     fn fields(message: &[u8]) -> Vec<(u64, Vec<u8>)> {

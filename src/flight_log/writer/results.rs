@@ -4,9 +4,9 @@
 use nalgebra::{Vector2, Vector3};
 
 use super::super::LogError;
-use super::super::cdr::CdrWriter;
 use super::schemas::{self, compose};
 use super::{LogWriter, MessageTimes, MessageType, encode, protobuf};
+use crate::flight_log::messages::cdr::CdrWriter;
 use crate::geometry::RigidTransform;
 
 /// Pose of a frame in its parent frame.

@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::playing_log::PlayingLog;
-use crate::flight_log::{FlightLog, RigCandidate, log_name};
+use crate::flight_log::{FlightLog, RigCandidate};
+use crate::text::log_name;
 
 /// Files that a person opens together.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

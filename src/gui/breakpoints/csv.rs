@@ -1,7 +1,7 @@
 //! Hits of all breakpoints; one hit per row.
 
 use super::BreakpointsPanel;
-use crate::flight_log::csv_writer::{CsvWriter, seconds_cell};
+use crate::files::csv_writer::{CsvWriter, seconds_cell};
 use crate::gui::{CsvTable, PanelContext};
 
 impl CsvTable for BreakpointsPanel {

@@ -6,9 +6,9 @@ use egui::{Button, CollapsingHeader, Grid, Key, RichText, ScrollArea, TextEdit, 
 
 use super::units::counted;
 use super::{Panel, PanelContext};
-use crate::flight_log::nearest_name;
 use crate::session::breakpoints::{Breakpoint, Condition, quantity_help};
 use crate::session::{Command, Recording};
+use crate::text::nearest_name;
 
 #[derive(Debug, Default)]
 pub struct BreakpointsPanel {

@@ -1,7 +1,7 @@
 //! The calibration table; one parameter per row.
 
 use super::CalibrationPanel;
-use crate::flight_log::csv_writer::{CsvWriter, number_cell};
+use crate::files::csv_writer::{CsvWriter, number_cell};
 use crate::gui::{CsvTable, PanelContext};
 use crate::session::flight_table;
 use crate::text::Named as _;

@@ -2,7 +2,7 @@
 
 use super::ComparisonPanel;
 use super::columns::label_of;
-use crate::flight_log::csv_writer::{CsvWriter, number_cell, seconds_cell};
+use crate::files::csv_writer::{CsvWriter, number_cell, seconds_cell};
 use crate::gui::{CsvTable, PanelContext};
 use crate::session::ComparedQuantity;
 use crate::text::Named as _;

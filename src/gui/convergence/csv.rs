@@ -1,7 +1,7 @@
 //! Calibration over time; one step per row.
 
 use super::ConvergencePanel;
-use crate::flight_log::csv_writer::{CsvWriter, number_cell, seconds_cell};
+use crate::files::csv_writer::{CsvWriter, number_cell, seconds_cell};
 use crate::gimbal::ParameterId;
 use crate::gui::chain_values::true_values;
 use crate::gui::{CsvTable, PanelContext};

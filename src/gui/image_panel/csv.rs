@@ -2,7 +2,7 @@
 
 use super::ImagePanel;
 use crate::estimator::FeatureReport;
-use crate::flight_log::csv_writer::{CsvWriter, number_cell};
+use crate::files::csv_writer::{CsvWriter, number_cell};
 use crate::gui::{CsvTable, PanelContext};
 
 impl CsvTable for ImagePanel {

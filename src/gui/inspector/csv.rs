@@ -1,7 +1,7 @@
 //! State at the cursor; one quantity per row.
 
 use super::InspectorPanel;
-use crate::flight_log::csv_writer::{CsvWriter, number_cell};
+use crate::files::csv_writer::{CsvWriter, number_cell};
 use crate::geometry::seconds_from_ns;
 use crate::gui::{CsvTable, PanelContext};
 

@@ -2,7 +2,7 @@
 
 use super::JacobianPanel;
 use super::{cameras, column_name, name_of};
-use crate::flight_log::csv_writer::CsvWriter;
+use crate::files::csv_writer::CsvWriter;
 use crate::gui::{CsvTable, PanelContext};
 
 impl CsvTable for JacobianPanel {

@@ -1,7 +1,7 @@
 //! Spectra of the compared parameterizations; one row per singular value or weight of a direction.
 
 use super::{LaboratoryPanel, LaboratoryView};
-use crate::flight_log::csv_writer::{CsvWriter, number_cell};
+use crate::files::csv_writer::{CsvWriter, number_cell};
 use crate::gui::{CsvTable, PanelContext};
 
 impl CsvTable for LaboratoryPanel {

@@ -1,7 +1,7 @@
 //! Singular values and directions at the cursor; one singular value per row.
 
 use super::RankPanel;
-use crate::flight_log::csv_writer::{CsvWriter, number_cell};
+use crate::files::csv_writer::{CsvWriter, number_cell};
 use crate::gui::{CsvTable, PanelContext};
 use crate::observability::CalibrationDirection;
 

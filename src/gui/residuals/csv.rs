@@ -3,7 +3,7 @@
 use super::image_plane::{ImageGeometry, ImageMeans};
 use super::{ResidualView, ResidualsPanel, rms_px};
 use crate::estimator::FactorKind;
-use crate::flight_log::csv_writer::{CsvWriter, number_cell, seconds_cell};
+use crate::files::csv_writer::{CsvWriter, number_cell, seconds_cell};
 use crate::gui::{CsvTable, PanelContext};
 use crate::session::{ImageResiduals, StepRecord};
 use crate::text::Named as _;

@@ -1,7 +1,7 @@
 //! Trajectories of the scene; one row per step of a run or pose of a trajectory.
 
 use super::ScenePanel;
-use crate::flight_log::csv_writer::{CsvWriter, number_cell, seconds_cell};
+use crate::files::csv_writer::{CsvWriter, number_cell, seconds_cell};
 use crate::geometry::seconds_from_ns;
 use crate::gui::{CsvTable, PanelContext};
 

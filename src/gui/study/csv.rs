@@ -4,7 +4,7 @@ use super::context::StudyPanel;
 use super::model::StudyModel;
 use super::plots::{differences, distributions, success_rates};
 use super::strips::StripPlot;
-use crate::flight_log::csv_writer::{CsvWriter, number_cell};
+use crate::files::csv_writer::{CsvWriter, number_cell};
 use crate::study::view::{Study, parameter_errors};
 
 /// Values of a panel with a header line: runs in the stored units with all columns, plots in the shown units.

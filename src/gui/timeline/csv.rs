@@ -1,7 +1,7 @@
 //! Lanes of the timeline; one row per step or event.
 
 use super::TimelinePanel;
-use crate::flight_log::csv_writer::{CsvWriter, number_cell, seconds_cell};
+use crate::files::csv_writer::{CsvWriter, number_cell, seconds_cell};
 use crate::gui::events::name_of;
 use crate::gui::residuals::rms_px;
 use crate::gui::{CsvTable, PanelContext};

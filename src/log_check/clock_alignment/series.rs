@@ -2,7 +2,7 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use crate::flight_log::attitude::rotation_at;
+use crate::flight_log::joints::attitude::rotation_at;
 use crate::geometry::{ns_from_seconds, seconds_from_ns, so3};
 use crate::sensors::AngularRates;
 

@@ -1,7 +1,7 @@
 //! Joint angles that stop changing although the vehicle rotates.
 
-use crate::flight_log::imu_filter::ROTATING_RAD_PER_S;
-use crate::flight_log::joint_merge::JointReading;
+use crate::flight_log::imu::filter::ROTATING_RAD_PER_S;
+use crate::flight_log::joints::JointReading;
 use crate::geometry::seconds_from_ns;
 use crate::log_check::imu::ImuFacts;
 use crate::log_check::measured_fault::{FaultySource, MeasuredFault};

@@ -10,8 +10,8 @@ use std::f64::consts::{PI, TAU};
 use super::report::{Area, Findings, Measurement, Severity};
 use super::statistics::{median, percentile, white_sigma};
 use super::survey::{Survey, is_in_radians};
-use crate::flight_log::attitude::MAX_VEHICLE_GAP_NS;
-use crate::flight_log::joint_merge::JointReading;
+use crate::flight_log::joints::JointReading;
+use crate::flight_log::joints::attitude::MAX_VEHICLE_GAP_NS;
 use crate::geometry::seconds_from_ns;
 use crate::sensors::{CameraMount, GimbalRig, Joint, Rig};
 

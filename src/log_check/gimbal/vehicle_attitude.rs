@@ -3,7 +3,7 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use crate::flight_log::attitude::MAX_VEHICLE_GAP_NS;
+use crate::flight_log::joints::attitude::MAX_VEHICLE_GAP_NS;
 use crate::geometry::{SIGMA_PER_MEDIAN, best_rotation, seconds_from_ns, so3};
 use crate::log_check::imu::ImuFacts;
 use crate::log_check::measured_fault::{FaultySource, MeasuredFault};

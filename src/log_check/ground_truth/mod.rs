@@ -12,7 +12,7 @@ use super::measured_fault::MeasuredFault;
 use super::report::{Area, Findings, ImageRotation, Measurement, Severity};
 use super::statistics::median;
 use crate::flight_log::log::relative_ns;
-use crate::flight_log::spacing::Spacing;
+use crate::flight_log::stamps::spacing::Spacing;
 use crate::flight_log::{FlightLog, RecordedPose};
 use crate::geometry::{RigidTransform, SignedAxes, ns_from_seconds, seconds_from_ns, so3};
 use crate::sensors::Rig;

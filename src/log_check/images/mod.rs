@@ -5,7 +5,7 @@ pub(super) mod still_pixels;
 use super::imu::ImuFacts;
 use super::report::{Area, Findings, Severity};
 use super::statistics::{median, percentile};
-use super::survey::image_measure::ImageMeasure;
+use super::survey::gradient_sums::ImageMeasure;
 use super::survey::{SampledImage, Survey};
 use crate::flight_log::FlightLog;
 use crate::flight_log::grey_levels::{GreyLevels, OUTSIDE_RATIO};

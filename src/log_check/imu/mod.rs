@@ -1,16 +1,13 @@
 //! IMU: units, gravity, biases, noise, saturation, and the stationary intervals that show them.
 
 pub(super) mod axes;
-mod densities;
-pub(super) mod orientation_topics;
 pub(super) mod spectrum;
 pub(super) mod stationary;
-mod unmeasured;
+pub(super) mod unmeasured;
 
 use nalgebra::Vector3;
 
-use self::densities::check_noise;
-use self::spectrum::Spectrum;
+use self::spectrum::{Spectrum, check_noise};
 use self::stationary::{Stamped, StationaryTest, WINDOW_NS, Window};
 use self::unmeasured::check_unmeasured;
 use super::measured_fault::{FaultySource, MeasuredFault};

@@ -3,7 +3,6 @@
 mod allan;
 mod render;
 mod samples;
-mod stretches;
 mod terms;
 #[cfg(test)]
 mod tests;
@@ -12,8 +11,7 @@ use nalgebra::Vector3;
 use serde::Serialize;
 
 use self::allan::{AllanPhase, AllanVariance, NoiseKind, confidence, counts, degrees_of_freedom, overlapping};
-use self::samples::ImuSeries;
-use self::stretches::{evenly_sampled, stationary_stretches};
+use self::samples::{ImuSeries, evenly_sampled, stationary_stretches};
 use self::terms::Fit;
 use super::imu::spectrum::{Spectrum, VibrationLine};
 use super::imu::stationary::Stamped;

@@ -3,7 +3,7 @@
 use std::fmt::{Display, Formatter, Result, Write as _};
 
 use super::{AllanReport, NoiseTerm, NoiseTerms, SensorNoise};
-use crate::flight_log::printable;
+use crate::text::printable;
 
 /// Maximum number of listed stretches.
 const MAX_LISTED: usize = 6;

@@ -10,9 +10,9 @@ use serde::ser::SerializeStruct as _;
 use serde::{Serialize, Serializer};
 
 use super::measured_fault::MeasuredFault;
-use crate::flight_log::without_signed_zeros;
 use crate::frontend::readout::RowTrack;
 use crate::sensors::ImageMask;
+use crate::text::without_signed_zeros;
 
 /// Severity of a finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]

@@ -1,7 +1,7 @@
 use std::fmt::{Display, Formatter, Result, Write as _};
 
 use super::{Area, CheckReport, Severity};
-use crate::flight_log::{printable, shortened, without_signed_zeros};
+use crate::text::{printable, shortened, without_signed_zeros};
 
 impl Severity {
     /// Lowercase name, printed before a finding.

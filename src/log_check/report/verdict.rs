@@ -5,8 +5,7 @@ use std::fmt::{Display, Formatter, Result};
 use serde::Serialize;
 
 use super::{Area, CheckReport, Finding, Severity};
-use crate::flight_log::printable;
-use crate::text::counted;
+use crate::text::{counted, printable};
 
 /// Number of findings that a verdict names.
 const NAMED: usize = 3;

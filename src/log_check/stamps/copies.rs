@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use super::used_topics::UsedTopic;
-use crate::flight_log::image_copies::CopyJudge;
-use crate::flight_log::imu_filter::{ROTATING_NS, ROTATING_RAD_PER_S};
+use crate::flight_log::images::copies::CopyJudge;
+use crate::flight_log::imu::filter::{ROTATING_NS, ROTATING_RAD_PER_S};
 use crate::geometry::{ns_from_seconds, seconds_from_ns};
 use crate::log_check::imu::ImuFacts;
 use crate::log_check::report::{Area, Findings, Severity};

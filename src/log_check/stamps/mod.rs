@@ -12,7 +12,7 @@ use self::used_topics::{UsedTopic, used_topics};
 use super::report::{Area, Findings, Severity};
 use super::statistics::percentile;
 use super::survey::Survey;
-use crate::flight_log::spacing::Spacing;
+use crate::flight_log::stamps::spacing::Spacing;
 use crate::geometry::seconds_from_ns;
 use crate::sensors::Rig;
 

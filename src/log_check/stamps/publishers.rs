@@ -1,7 +1,7 @@
 //! Two publishers on one topic.
 
 use super::used_topics::UsedTopic;
-use crate::flight_log::spacing::Spacing;
+use crate::flight_log::stamps::spacing::Spacing;
 use crate::geometry::seconds_from_ns;
 use crate::log_check::measured_fault::{FaultySource, MeasuredFault};
 use crate::log_check::report::{Area, Findings, Measurement, Severity};

@@ -2,13 +2,13 @@
 
 use nalgebra::UnitQuaternion;
 
-use crate::flight_log::attitude::{
+use crate::flight_log::joints::JointReading;
+use crate::flight_log::joints::attitude::{
     MAX_VEHICLE_GAP_NS, TransformMerge, TransformPath, gimbal_kinds, rotation_at, topic_field, vehicle_topic,
 };
-use crate::flight_log::joint_merge::JointReading;
 use crate::flight_log::log::relative_ns;
 use crate::flight_log::messages::{self, MessageKind};
-use crate::flight_log::stamp_clock::StampClock;
+use crate::flight_log::stamps::clock::StampClock;
 use crate::flight_log::{FlightLog, LogError};
 use crate::geometry::ns_from_seconds;
 use crate::sensors::{AttitudeFrame, AttitudeMessage, AttitudeSource, AttitudeValue, GimbalRig};

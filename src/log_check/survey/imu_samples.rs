@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 
-use crate::flight_log::imu_filter::{FilteredSample, ImuFilter, Unmeasured, is_measured};
-use crate::flight_log::imu_merge::ImuMerge;
+use crate::flight_log::imu::filter::{FilteredSample, ImuFilter, Unmeasured, is_measured};
+use crate::flight_log::imu::merge::ImuMerge;
 use crate::sensors::ImuSample;
 
 /// Stamps of the messages that are no measurement, by reason.

@@ -2,7 +2,6 @@
 
 pub(super) mod attitude;
 pub(super) mod gradient_sums;
-pub(super) mod image_measure;
 mod imu_samples;
 pub(super) mod topic_survey;
 
@@ -13,18 +12,17 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use self::attitude::{AttitudeSurvey, SolvedAttitude};
-use self::gradient_sums::GradientSums;
-use self::image_measure::{ImageMeasure, measure};
+use self::gradient_sums::{GradientSums, ImageMeasure, measure};
 use self::imu_samples::{UnmeasuredStamps, measured};
 use self::topic_survey::{Times, TopicSurvey};
 use super::statistics::white_sigma;
 use crate::flight_log::container::DecodedBlock;
 use crate::flight_log::grey_levels::GreyLevels;
-use crate::flight_log::grey_sampling::grey_levels_of_topic;
-use crate::flight_log::image_decoding::decode_image;
-use crate::flight_log::joint_merge::{JointMerge, JointReading};
+use crate::flight_log::images::decoding::decode_image;
+use crate::flight_log::images::grey_sampling::grey_levels_of_topic;
+use crate::flight_log::joints::{JointMerge, JointReading};
 use crate::flight_log::log::relative_ns;
-use crate::flight_log::message_content::frame_and_checksum;
+use crate::flight_log::messages::frame_and_checksum;
 use crate::flight_log::stream::angle_fit::{self, FittedAngle};
 use crate::flight_log::{FlightLog, messages, messages::MessageKind};
 use crate::geometry::{ns_from_seconds, seconds_from_ns, wrap_angle};

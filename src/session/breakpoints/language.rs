@@ -2,9 +2,9 @@
 
 use super::quantities::{CAUSES, EVENTS, FLAGS, NAMED, NUMBERS, NamedNumber, Quantity, StepFlag};
 use crate::estimator::FactorKind;
-use crate::flight_log::nearest_name;
 use crate::text::Named as _;
 use crate::text::condition::{Arithmetic, ConditionProblem, Expression, Language, Number, Parser, Predicate, Token};
+use crate::text::nearest_name;
 
 const FUNCTIONS: [&str; 5] = ["singular", "rise", "abs", "min", "max"];
 

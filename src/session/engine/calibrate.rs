@@ -1,22 +1,25 @@
-//! Offline calibration of a log: features of both cameras are tracked first, then the calibration is estimated.
+//! Offline calibration of a log: features of both cameras are tracked first, then the calibration is estimated, from the
+//! posterior of earlier flights if there is one; errors against ground truth by stage.
 
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, mpsc};
 
+use serde::Serialize;
 use thiserror::Error;
 
 use super::configuration::estimator_config;
-use super::offline_prior::{earlier_flights, with_absolute_shifts};
 use super::tracker::CameraTracker;
 use crate::calibration::{
     self, CalibrationError, CalibrationInput, CalibrationOptions, CalibrationOutcome, CalibrationProgress,
-    GimbalCamera, InitialTrajectory, StaticCamera, TrackedView,
+    ChainDistance, EarlierFlights, GimbalCamera, InitialTrajectory, StaticCamera, TrackedView,
 };
 use crate::estimator::CalibrationPosterior;
-use crate::flight_log::{FlightLog, LogError, LogLimits, LogWarning};
+use crate::files::LogLimits;
+use crate::flight_log::{FlightLog, LogError, LogWarning};
 use crate::geometry::{Dimension, RigidTransform, ns_from_seconds, seconds_from_ns};
+use crate::gimbal::{ClassicalChain, ParameterId, Parameterization};
 use crate::sensors::{CameraMount, CameraRig, ChainPrior, GimbalRig, Rig};
 use crate::session::plan::{FlightPrior, ParameterizationChoice, RunSpec, SessionError, check_start};
 
@@ -307,4 +310,99 @@ fn calibrated(rig: &Rig, entries: &CalibratedEntries, outcome: &CalibrationOutco
         };
     }
     calibrated
+}
+
+/// Prior of an offline calibration of the static camera and the gimbal camera; `mounts` are the `imu_from_camera` of the
+/// first and the gimbal of the second.
+///
+/// # Errors
+/// If the posterior belongs to another mechanism, or to a parameterization that the offline calibration does not have.
+pub(super) fn earlier_flights(
+    prior: &FlightPrior,
+    cameras: [&CameraRig; 2],
+    (imu_from_camera, gimbal): (RigidTransform, &GimbalRig),
+) -> Result<EarlierFlights, SessionError> {
+    let user = "the offline calibration".to_owned();
+    let refused = |problem: String| SessionError::Prior { user, problem, folder: prior.folder.clone() };
+    let places = cameras.map(|camera| prior.place(&camera.key));
+    let check = || {
+        prior.check_cameras(&cameras.map(|camera| camera.key.as_str()), &places)?;
+        let joints: Vec<String> = gimbal.joints.iter().map(|joint| joint.name.clone()).collect();
+        let mount = ClassicalChain { imu_from_base: imu_from_camera, ..ClassicalChain::default() };
+        for (place, chain) in places.into_iter().zip([&mount, &gimbal.chain]) {
+            let Some(place) = place else { continue };
+            prior.check_chain(place, chain, &joints, true)?;
+            let parameterization = prior.posterior.cameras[place].parameterization;
+            if matches!(parameterization, Parameterization::Classical | Parameterization::Poe) {
+                return Err(format!(
+                    "its parameterization is {parameterization}, the offline calibration needs a minimal one"
+                ));
+            }
+        }
+        Ok(())
+    };
+    check().map_err(refused)?;
+    let given_shifts_s = cameras.map(|camera| camera.timeshift_cam_imu_s);
+    Ok(EarlierFlights { posterior: prior.posterior.grown(prior.growth), places, given_shifts_s })
+}
+
+/// Posterior with the time offsets of its cameras instead of their changes against the rig; `cameras` are in its order.
+pub(super) fn with_absolute_shifts(posterior: &CalibrationPosterior, cameras: [&CameraRig; 2]) -> CalibrationPosterior {
+    let mut absolute = posterior.clone();
+    for (found, camera) in absolute.cameras.iter_mut().zip(cameras) {
+        let columns = found.parameters.iter().zip(&mut found.values);
+        for (_, shift_s) in columns.filter(|(parameter, _)| **parameter == ParameterId::timeshift(0)) {
+            *shift_s += camera.timeshift_cam_imu_s;
+        }
+    }
+    absolute
+}
+
+/// Errors of `imu_from_camera` against the ground truth, those of the chain over the joint angles of the log.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CalibrationErrors {
+    /// Static camera in the given rig.
+    pub static_initial: ChainDistance,
+    /// Static camera after the camera–IMU calibration of the static camera alone.
+    pub static_camera_imu: ChainDistance,
+    /// Static camera after the bundle adjustment of both cameras.
+    pub static_final: ChainDistance,
+    /// Chain in the given rig.
+    pub chain_initial: ChainDistance,
+    /// Chain after the pose loops.
+    pub chain_pose_loop: ChainDistance,
+    /// Chain after the bundle adjustment of both cameras.
+    pub chain_final: ChainDistance,
+}
+
+impl CalibrationRun {
+    /// Errors against ground truth; `None` without a ground-truth rig with this static camera and a gimbal of as many
+    /// joints.
+    pub fn errors(&self) -> Option<CalibrationErrors> {
+        let outcome = &self.outcome;
+        let extrinsics = self.true_extrinsics()?;
+        let chain = &self.ground_truth_rig.as_ref()?.gimbal.as_ref()?.chain;
+        if chain.joint_count() != outcome.chain.joint_count() {
+            return None;
+        }
+        let of_extrinsics = |found: &RigidTransform| ChainDistance::of_extrinsics(found, &extrinsics);
+        let of_chain = |found: &ClassicalChain| ChainDistance::over(found, chain, &outcome.visited_rad);
+        Some(CalibrationErrors {
+            static_initial: of_extrinsics(&outcome.extrinsics.initial),
+            static_camera_imu: of_extrinsics(&outcome.static_camera_imu.imu_from_camera),
+            static_final: of_extrinsics(&outcome.extrinsics.imu_from_camera),
+            chain_initial: of_chain(&outcome.given_chain)?,
+            chain_pose_loop: of_chain(&outcome.pose_loop.chain)?,
+            chain_final: of_chain(&outcome.chain)?,
+        })
+    }
+
+    /// `imu_from_camera` of the static camera in the ground-truth rig; `None` without one.
+    pub fn true_extrinsics(&self) -> Option<RigidTransform> {
+        let cameras = &self.ground_truth_rig.as_ref()?.cameras;
+        match cameras.iter().find(|camera| camera.key == self.static_camera)?.mount {
+            CameraMount::Static { imu_from_camera } => Some(imu_from_camera),
+            CameraMount::Gimbal => None,
+        }
+    }
 }

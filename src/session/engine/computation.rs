@@ -4,10 +4,13 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::history::{History, SnapshotUse};
-use super::message::EngineMessage;
 use super::recompute::{Detail, RecomputeRequest, Recomputed};
+use crate::estimator::CalibrationPosterior;
+use crate::flight_log::LogWarning;
 use crate::session::plan::SessionPlan;
-use crate::session::record::{Recording, RunRecord, SolverPosition, SolverTrace, StepFactorRows, StepRecord};
+use crate::session::record::{
+    PassProgress, Recording, RunRecord, SolverPosition, SolverTrace, StepFactorRows, StepRecord,
+};
 
 /// Divisor of the memory budget: estimator snapshots may take half of it. They take precedence over complete steps:
 /// from a snapshot any step is recomputed quickly, while a complete step helps only at the cursor.
@@ -187,4 +190,28 @@ impl Computation {
     pub fn snapshots(&self, run: usize) -> Option<SnapshotUse> {
         self.history(run).map(|history| history.snapshots())
     }
+}
+
+/// A message from a thread of the engine to the collector.
+#[derive(Debug)]
+pub(in crate::session) enum EngineMessage {
+    /// A run has computed a step.
+    Step {
+        run: usize,
+        record: Box<StepRecord>,
+    },
+    /// A run with several passes is at a stamp of a pass before the last one.
+    Pass {
+        run: usize,
+        progress: PassProgress,
+    },
+    /// A run has reached the end of the log, or has failed without a possible restart.
+    Finished {
+        run: usize,
+        /// Reason of an early end, `None` at the end of the log.
+        error: Option<String>,
+        /// Calibration at its end, `None` without a window or with a fixed calibration.
+        posterior: Option<Arc<CalibrationPosterior>>,
+    },
+    Warnings(Vec<LogWarning>),
 }

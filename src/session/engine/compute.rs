@@ -2,8 +2,7 @@
 
 use std::sync::atomic::Ordering;
 
-use super::computation::Computation;
-use super::message::EngineMessage;
+use super::computation::{Computation, EngineMessage};
 use super::threads::Engine;
 use crate::session::breakpoints::{Breakpoints, Condition, Hit, NamedValue};
 use crate::session::plan::{SessionError, SessionPlan};

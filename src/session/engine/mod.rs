@@ -7,7 +7,6 @@
 
 mod altered_measurements;
 mod calibrate;
-mod calibration_errors;
 mod computation;
 mod compute;
 mod configuration;
@@ -16,8 +15,6 @@ mod flight_noise;
 mod fork;
 mod history;
 mod image_rotations;
-mod message;
-mod offline_prior;
 mod passes;
 mod planned_flight;
 mod recompute;
@@ -29,8 +26,9 @@ mod synchronized_frames;
 mod threads;
 mod tracker;
 
+pub use self::calibrate::CalibrationErrors;
+pub(in crate::session) use self::computation::EngineMessage;
 pub use calibrate::{CalibrationRequest, CalibrationRun, CalibrationRunError, calibrate};
-pub use calibration_errors::CalibrationErrors;
 pub use computation::Computation;
 pub use compute::{BreakpointHit, compute, compute_until};
 #[cfg(test)]
@@ -41,7 +39,6 @@ pub(in crate::session) use history::History;
 pub use history::SnapshotUse;
 pub(in crate::session) use image_rotations::rotation_between;
 pub use image_rotations::{camera_rotations, image_rotations};
-pub(in crate::session) use message::EngineMessage;
 #[cfg(test)]
 pub(in crate::session) use passes::EarlierPasses;
 pub(in crate::session) use passes::guarded;

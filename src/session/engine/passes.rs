@@ -7,7 +7,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::mpsc::SyncSender;
 
-use super::message::EngineMessage;
+use super::computation::EngineMessage;
 use super::run_engine::RunEngine;
 use super::step_inputs::OwnedStepInput;
 use crate::estimator::{EarlierPass, EstimatorConfig};

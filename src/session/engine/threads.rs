@@ -9,10 +9,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::{Builder, JoinHandle};
 
-use super::computation::Computation;
+use super::computation::{Computation, EngineMessage};
 use super::configuration::estimator_config;
 use super::history::History;
-use super::message::EngineMessage;
 use super::passes::{EarlierPasses, PassFailure, guarded};
 use super::run_engine::RunEngine;
 use super::step_inputs::OwnedStepInput;

@@ -10,17 +10,15 @@ mod run_spec;
 mod session_plan;
 mod trajectories;
 mod trajectory_spec;
-mod tuning;
 
 pub(in crate::session) use correction::LONGEST_SHIFT_S;
 pub use correction::{ImageFlip, ImageHalf, MeasurementCorrection};
 pub use error::SessionError;
 pub use flight_prior::{FlightPrior, FlightSigmas};
 pub use fork_changes::{FORK_PARAMETERIZATIONS, ForkChanges, ForkError};
-pub use run_spec::{MAX_RUNS, ParameterizationChoice, RunSpec, RunSpecError};
+pub use run_spec::{EstimatorTuning, MAX_RUNS, ParameterizationChoice, RunSpec, RunSpecError};
 pub(in crate::session) use run_spec::{distinct_label, distinct_labels};
 pub use session_plan::{DEFAULT_MEMORY_BUDGET_BYTES, SessionPlan, SessionRequest};
 pub(in crate::session) use session_plan::{RunCameras, cameras_of_run, chain_parameters, check_start};
 pub use trajectories::{LoadedPositions, LoadedTrajectory};
 pub use trajectory_spec::{MAX_TRAJECTORIES, TrajectorySource, TrajectorySpec, TrajectorySpecError};
-pub use tuning::EstimatorTuning;

@@ -4,7 +4,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::error::SessionError;
 use super::trajectory_spec::{MAX_TRAJECTORIES, TrajectorySource, TrajectorySpec, distinct_trajectory_labels};
-use crate::flight_log::stamp_clock::StampClock;
+use crate::flight_log::stamps::clock::StampClock;
 use crate::flight_log::{FlightLog, LogError, RecordedPose, read_trajectory_file};
 use crate::geometry::{RigidTransform, ns_from_seconds, seconds_from_ns};
 use crate::sensors::{LeverArm, PoseSample, PoseTrack, PositionSample, Rig};

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::markers::Marker;
-use crate::flight_log::LogLimits;
+use crate::files::LogLimits;
 use crate::sensors::LeverArm;
 use crate::session::plan::{ForkChanges, RunSpec, SessionError, SessionRequest, TrajectorySource, TrajectorySpec};
 

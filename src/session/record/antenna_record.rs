@@ -2,8 +2,7 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use super::trajectory_accuracy::TrajectoryAccuracy;
-use super::trajectory_evaluation::TrajectoryEvaluation;
+use super::trajectory_accuracy::{TrajectoryAccuracy, TrajectoryEvaluation};
 use crate::geometry::{RigidTransform, seconds_from_ns};
 use crate::sensors::{LeverArm, NEAREST_POSE_NS, PoseSample, PoseTrack, PositionSample};
 use crate::session::accuracy::{AlignmentSums, StampedPose, TrajectoryAlignment};

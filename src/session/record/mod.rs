@@ -7,9 +7,7 @@ mod flight_parameter;
 mod flight_table;
 mod flight_verdicts;
 mod image_residuals;
-mod known_losses;
-mod lost_since;
-mod pose_consistency;
+mod losses;
 mod pose_errors;
 mod recording;
 mod rig_values;
@@ -20,10 +18,8 @@ mod solver_trace;
 mod step;
 mod summary;
 mod trajectory_accuracy;
-mod trajectory_evaluation;
 mod trajectory_lane;
 mod warning_lines;
-mod warnings;
 
 pub use antenna_record::PositionTruth;
 pub use collected_information::CollectedInformation;
@@ -32,20 +28,18 @@ pub use flight_parameter::FlightParameter;
 pub use flight_table::{flight_headline, flight_table, least_determined};
 pub use flight_verdicts::{FlightVerdicts, flight_advice};
 pub use image_residuals::{ImageResiduals, MeanResidual, ResidualSum};
-pub use known_losses::KnownLossSummary;
-pub use lost_since::LostSince;
-pub use pose_consistency::PoseConsistency;
-pub use pose_errors::PoseError;
+pub use losses::{KnownLossSummary, LostSince};
+pub use pose_errors::{PoseConsistency, PoseError};
 pub use recording::Recording;
 pub use run::{ForkOrigin, PassProgress, RunMemory, RunRecord};
 pub use run_summary::{ParameterSummary, RunSummary, StageSummary, summarize};
 pub use solver_trace::{SolverPosition, SolverTrace};
 pub(in crate::session) use step::tracks_bytes;
-pub use step::{StepFactorRows, StepRecord};
-pub use trajectory_accuracy::{RELATIVE_LENGTHS_M, RelativeAccuracy, TrajectoryAccuracy};
-pub use trajectory_evaluation::{TrajectoryEvaluation, evaluate_trajectory};
+#[cfg(test)]
+pub(in crate::session) use step::warnings_of;
+pub use step::{RunWarning, StepFactorRows, StepRecord};
+pub use trajectory_accuracy::{
+    RELATIVE_LENGTHS_M, RelativeAccuracy, TrajectoryAccuracy, TrajectoryEvaluation, evaluate_trajectory,
+};
 pub use trajectory_lane::TrajectoryLane;
 pub use warning_lines::{WarningLine, log_warning_lines, run_warning_lines, warning_lines};
-pub use warnings::RunWarning;
-#[cfg(test)]
-pub(in crate::session) use warnings::warnings_of;

@@ -6,7 +6,7 @@ use serde::{Serialize, Serializer};
 
 use super::flight_parameter::FlightParameter;
 use super::flight_table::flight_table;
-use super::known_losses::{KnownLossSummary, known_losses};
+use super::losses::{KnownLossSummary, known_losses};
 use super::recording::Recording;
 use super::run::RunRecord;
 use super::trajectory_accuracy::TrajectoryAccuracy;
@@ -14,13 +14,12 @@ use super::trajectory_lane::TrajectoryLane;
 use super::warning_lines::{log_warning_lines, run_warning_lines};
 use crate::calibration::ChainDistance;
 use crate::estimator::{EventKind, Phase, StageTimes};
-use crate::flight_log::log_name;
 use crate::geometry::{Dimension, seconds_from_ns};
 use crate::gimbal::{ClassicalChain, ParameterId};
 use crate::observability::{Deficit, ParameterRate, information_rate};
 use crate::sensors::Rig;
 use crate::session::accuracy::path_length_m;
-use crate::text::Named as _;
+use crate::text::{Named as _, log_name};
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FrameCounts {

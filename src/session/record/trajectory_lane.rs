@@ -7,8 +7,7 @@ use serde::{Serialize, Serializer};
 
 use super::antenna_record::PositionTruth;
 use super::run::{NEXT_ID, RunRecord};
-use super::trajectory_accuracy::MAX_POSITION_AGE_NS;
-use super::trajectory_evaluation::{TrajectoryEvaluation, evaluate_trajectory};
+use super::trajectory_accuracy::{MAX_POSITION_AGE_NS, TrajectoryEvaluation, evaluate_trajectory};
 use crate::geometry::{RigidTransform, seconds_from_ns, vertical_angle};
 use crate::sensors::PoseTrack;
 use crate::session::accuracy::path_length_m;

@@ -37,7 +37,7 @@ impl StudyPlan {
     /// with two levels of the same name.
     pub fn from_toml(text: &str) -> Result<Self, PlanError> {
         let document = parse(text)?;
-        let root = Section::root(text, &document);
+        let root = Section::root(&document);
         root.allow(&PLAN_KEYS)?;
         let plan = Self {
             name: root.text("name")?.unwrap_or_default(),

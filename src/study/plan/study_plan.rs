@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use super::summary_table::SummaryTable;
 use crate::session::{RunSpec, TrajectorySpec};
 use crate::study::perturbation::RigPerturbation;
 use crate::study::recipe::FlightRecipe;
-use crate::study::summary_table::SummaryTable;
 use crate::study::table::StudyTable;
 
 /// Recorded logs of a plan: every file that a pattern matches.

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::document::{PlanError, SEEDS, Section};
 use super::study_plan::{Exclusion, StudyPlan};
-use crate::study::summary_table::{ReferenceValue, Statistic, SummaryColumn, SummaryTable, is_run_column};
+use super::summary_table::{ReferenceValue, Statistic, SummaryColumn, SummaryTable, is_run_column};
 
 const FACTORS: std::ops::RangeInclusive<f64> = -1e12..=1e12;
 /// Maximum number of digits after the decimal point.

@@ -3,11 +3,11 @@
 //! Numbers are compared with columns of numbers and may have a unit (`chain_error_m < 5 mm`) and arithmetic; texts are
 //! compared with columns of texts, with or without quotes. A comparison with an empty cell is false.
 
-use crate::flight_log::nearest_name;
 use crate::study::{ColumnType, StudyTable};
 use crate::text::condition::{
     ComparisonOperator, ConditionProblem, Expression, Language, Number, Parser, Predicate, Token, Values, parse,
 };
+use crate::text::nearest_name;
 
 /// A condition on rows; an empty one lets every row pass.
 #[derive(Clone, Debug, Default, PartialEq)]

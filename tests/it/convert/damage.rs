@@ -4,7 +4,7 @@ use std::fs;
 use std::ops::Range;
 use std::path::Path;
 
-use dcvins::flight_log::LogLimits;
+use dcvins::files::LogLimits;
 use dcvins::flight_log::convert::{ConvertOptions, convert_with};
 use rusqlite::Connection;
 

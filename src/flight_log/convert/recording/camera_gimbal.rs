@@ -5,7 +5,7 @@ use serde::Deserialize;
 
 use super::mp4::Video;
 use super::recorded::{GimbalAttitude, GimbalFrame, Recorded, from_euler};
-use crate::flight_log::geodesy::Geodetic;
+use crate::flight_log::trajectory::geodesy::Geodetic;
 use crate::geometry::median;
 
 /// Identifier of the messages.

@@ -7,7 +7,7 @@ use super::dataflash::utc_from_gps_ns;
 use super::mp4::Payload;
 use super::recorded::{Recorded, finite};
 use super::scalar::Scalar;
-use crate::flight_log::geodesy::Geodetic;
+use crate::flight_log::trajectory::geodesy::Geodetic;
 use crate::geometry::median;
 
 /// Name of the format in the report.

@@ -7,7 +7,6 @@ mod candidates;
 mod damage;
 mod dataflash;
 mod gpmf;
-mod mavlink_gimbal;
 mod mp4;
 mod recorded;
 mod rig;
@@ -23,9 +22,9 @@ use std::fs::File;
 use std::io::Read as _;
 use std::path::Path;
 
-use super::super::file::ZSTD_MAGIC;
 use super::sink::LogSink;
 use super::{AutopilotLog, AutopilotLogKind, ConvertError, ConvertOptions, VideoClock};
+use crate::flight_log::container::file::ZSTD_MAGIC;
 use crate::geometry::{ns_from_seconds, seconds_from_ns};
 use mp4::Movie;
 use recorded::Recorded;

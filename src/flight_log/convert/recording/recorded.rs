@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use super::candidates::{Candidates, Samples};
-use crate::flight_log::geodesy::Geodetic;
+use crate::flight_log::trajectory::geodesy::Geodetic;
 use crate::geometry::seconds_from_ns;
 
 /// Standard gravity (ISO 80000-3), the unit of accelerations in g.

@@ -5,7 +5,7 @@
 
 use super::mp4::{Payload, Video};
 use super::recorded::{GimbalAttitude, GimbalFrame, Recorded, from_euler};
-use crate::flight_log::geodesy::Geodetic;
+use crate::flight_log::trajectory::geodesy::Geodetic;
 
 /// Name of the format in the report.
 const FORMAT: &str = "SIYI subtitles";

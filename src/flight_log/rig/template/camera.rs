@@ -4,7 +4,7 @@ use std::str::FromStr;
 
 use super::TemplateError;
 use crate::camera::{CameraModel, Distortion, Projection};
-use crate::flight_log::nearest_name;
+use crate::text::nearest_name;
 
 /// Horizontal field of view from which a lens is assumed equidistant: no rectilinear lens of a camera is wider.
 const WIDEST_RECTILINEAR_DEG: f64 = 110.0;

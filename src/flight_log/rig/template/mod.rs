@@ -3,7 +3,6 @@
 mod camera;
 mod error;
 mod mechanism;
-mod suggested;
 #[cfg(test)]
 mod tests;
 mod text;
@@ -12,16 +11,15 @@ mod topics;
 pub use camera::{CameraChoice, PublishedCamera};
 pub use error::TemplateError;
 pub use mechanism::{GimbalAxis, MechanismAxes};
-pub use suggested::suggested_mechanism;
-pub use topics::RigChoices;
+pub use topics::{RigChoices, suggested_mechanism};
 
 use nalgebra::Vector3;
 
 use crate::camera::CameraModel;
-use crate::gimbal::ClassicalChain;
+use crate::files::urdf::DescribedChain;
 use crate::sensors::{
     AssumedField, AttitudeSource, BodyAxes, CameraMount, CameraRig, ChainPrior, GimbalImuRig, GimbalRig, ImuIntrinsics,
-    ImuNoise, ImuRig, IntrinsicsSigma, Joint, Rig,
+    ImuNoise, ImuRig, IntrinsicsSigma, Rig,
 };
 
 /// Standard deviations of intrinsics from a field of view: of the focal length as a ratio (manufacturers round, crop
@@ -116,16 +114,6 @@ impl CameraTemplate {
             distortion: ASSUMED_DISTORTION,
         }
     }
-}
-
-/// Chain from the IMU to the camera with known dimensions, such as that of a robot description.
-#[derive(Clone, Debug, PartialEq)]
-pub struct DescribedChain {
-    /// Without links for a rigid camera.
-    pub chain: ClassicalChain,
-    pub joints: Vec<Joint>,
-    /// Origin of the dimensions and assumptions about them, as one sentence without a full stop.
-    pub reason: String,
 }
 
 #[derive(Clone, Debug, PartialEq)]

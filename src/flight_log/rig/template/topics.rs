@@ -4,15 +4,17 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 
-use super::super::fields::Field;
 use super::camera::{of_field_of_view, of_published};
 use super::{
-    AngleTemplate, AttitudeTemplate, CameraChoice, CameraTemplate, DescribedChain, GimbalAxis, GimbalTemplate,
-    ImuTemplate, MechanismAxes, RigTemplate, Sourced, TYPICAL_IMU_NOISE, TemplateError,
+    AngleTemplate, AttitudeTemplate, CameraChoice, CameraTemplate, GimbalAxis, GimbalTemplate, ImuTemplate,
+    MechanismAxes, RigTemplate, Sourced, TYPICAL_IMU_NOISE, TemplateError,
 };
 use crate::camera::CameraModel;
-use crate::flight_log::messages::{self, MessageKind};
-use crate::flight_log::{FlightLog, LogError, TopicInfo};
+use crate::files::FileError;
+use crate::files::located::Located;
+use crate::files::rig::fields::Field;
+use crate::files::urdf::DescribedChain;
+use crate::flight_log::{FlightLog, MessageKind, TopicInfo, messages};
 use crate::sensors::{BodyAxes, ImuNoise};
 use crate::text::Named as _;
 
@@ -339,15 +341,13 @@ fn attitude(
         })
     });
     let rate_hz = info.transpose()?.map_or(IMAGE_RATE_HZ, |info| rounded_hz(info.rate_hz, IMAGE_RATE_HZ));
-    let mut mapping = serde_json::Map::new();
-    mapping.insert("imu_axes".to_owned(), imu_axes.name().into());
-    mapping.extend(entries.iter().map(|(key, value)| (key.clone(), value.as_str().into())));
-    mapping.insert("topic".to_owned(), topic.into());
-    let document = serde_json::Value::Object(mapping);
-    let source = super::super::attitude::read(&Field::root(&document, Path::new("")));
+    let given = entries.iter().map(|(key, value)| (key.as_str(), value.as_str()));
+    let document =
+        Located::of_texts([("imu_axes", imu_axes.name())].into_iter().chain(given).chain([("topic", topic)]));
+    let source = crate::files::rig::attitude::read(&Field::root(&document, Path::new("")));
     let (_, source) = source.map_err(|error| TemplateError::Attitude {
         problem: match error {
-            LogError::Rig { field, problem, .. } => format!("{field}: {problem}"),
+            FileError::Rig { field, problem, .. } => format!("{field}: {problem}"),
             error => error.to_string(),
         },
     })?;
@@ -400,4 +400,20 @@ fn ground_truth_topic(log: &FlightLog) -> Option<String> {
         GROUND_TRUTH_WORDS.iter().any(|word| name.contains(word))
     };
     poses.iter().find(named).map(|info| info.topic.clone())
+}
+
+/// Largest number of joints of a message that is taken for a gimbal's: robots publish those of arms and wheels too.
+const MOST_JOINTS: usize = 4;
+
+/// Axes in the order of the joints of the first readable `JointState` message; `None` if a name suggests no axis or an
+/// axis is repeated.
+pub fn suggested_mechanism(log: &FlightLog) -> Option<MechanismAxes> {
+    let topic = log.topics_of(&[MessageKind::JointState]).into_iter().next()?;
+    let axes = log.find_message(&topic, |data| {
+        let message = messages::read_joint_state(data).ok()?;
+        let axes: Option<Vec<GimbalAxis>> = message.names.iter().map(|name| GimbalAxis::of_joint(name)).collect();
+        axes.filter(|axes| !axes.is_empty() && axes.len() <= MOST_JOINTS)
+    })?;
+    let repeated = axes.iter().enumerate().any(|(place, axis)| axes[..place].contains(axis));
+    (!repeated).then_some(MechanismAxes(axes))
 }

@@ -7,13 +7,13 @@ use egui::{Button, CollapsingHeader, Label, RichText, ScrollArea, TextEdit, Ui};
 
 use super::draft::{DraftWorker, RigDraft};
 use super::form::RigForm;
-use crate::flight_log::{RigCandidate, log_name};
+use crate::flight_log::RigCandidate;
 use crate::gui::app::open_request::{OpenRequest, RigQuestion};
 use crate::gui::app::repaint::POLL_PERIOD;
 use crate::gui::desktop::Desktop;
 use crate::gui::theme::Theme;
 use crate::gui::window::Modal;
-use crate::text::counted;
+use crate::text::{counted, log_name};
 
 /// Width of the dialog in points.
 const WIDTH: f32 = 900.0;

@@ -2,7 +2,7 @@
 
 use egui::{ComboBox, Ui};
 
-use crate::flight_log::attitude::VEHICLE_KINDS;
+use crate::flight_log::joints::attitude::VEHICLE_KINDS;
 use crate::flight_log::{FlightLog, MessageKind, TopicInfo};
 use crate::sensors::{AngleUnit, AttitudeFrame, BodyAxes};
 use crate::text::Named as _;

@@ -1,6 +1,6 @@
 //! Table of σ as comma-separated values.
 
-use crate::flight_log::csv_writer::{CsvWriter, number_cell};
+use crate::files::csv_writer::{CsvWriter, number_cell};
 use crate::observability::laboratory::{MotionPrediction, PlanTable};
 use crate::text::Named as _;
 

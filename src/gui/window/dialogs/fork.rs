@@ -6,12 +6,11 @@ use egui::{ComboBox, DragValue, Grid, RichText, TextEdit, Ui, vec2};
 
 use super::modal::{Modal, accept_or_cancel_ui};
 use crate::estimator::SensorParameters;
-use crate::flight_log::nearest_name;
 use crate::gimbal::ParameterGroup;
 use crate::gui::PanelContext;
 use crate::gui::units::seconds;
 use crate::session::{Command, FORK_PARAMETERIZATIONS, ForkChanges, RunSpec};
-use crate::text::{Field, Key, Label, Named as _, written_items};
+use crate::text::{Field, Key, Label, Named as _, nearest_name, written_items};
 
 /// First entry of the list: the parent's parameterization.
 const AS_BEFORE: &str = "unchanged";

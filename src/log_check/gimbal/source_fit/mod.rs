@@ -2,14 +2,12 @@
 //! time offset that predict them, if those of the rig do not.
 
 mod meanings;
-mod quaternion_faults;
 #[cfg(test)]
 mod tests;
 
 use nalgebra::{Unit, UnitQuaternion, Vector3};
 
-use self::meanings::{changes, difference};
-use self::quaternion_faults::corrected;
+use self::meanings::{changes, corrected, difference};
 use crate::geometry::{ns_from_seconds, principal_angle, seconds_from_ns, so3};
 use crate::log_check::imu::ImuFacts;
 use crate::log_check::measured_fault::{FaultySource, MeasuredFault};

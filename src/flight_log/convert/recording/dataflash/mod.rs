@@ -6,11 +6,11 @@ use std::path::Path;
 
 use nalgebra::UnitQuaternion;
 
-use super::super::super::file::LogFile;
 use super::super::ConvertError;
 use super::super::sink::LogSink;
 use super::recorded::{GimbalAttitude, GimbalFrame, Recorded, finite, from_euler, nanoseconds};
-use crate::flight_log::geodesy::Geodetic;
+use crate::flight_log::container::file::LogFile;
+use crate::flight_log::trajectory::geodesy::Geodetic;
 use records::Record;
 pub(super) use records::START;
 

@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::super::super::super::file::{FileWindow, LogFile};
 use super::super::super::ConvertError;
 use super::super::damage::Damage;
 use super::super::scalar::Scalar;
+use crate::flight_log::container::file::{FileWindow, LogFile};
 
 /// First bytes of every record.
 pub(in super::super) const START: [u8; 2] = [0xA3, 0x95];

@@ -3,7 +3,7 @@
 use super::super::mp4::Payload;
 use super::super::recorded::{Recorded, STANDARD_GRAVITY_M_PER_S2, finite, from_euler, nanoseconds};
 use super::items::{Item, Properties};
-use crate::flight_log::geodesy::Geodetic;
+use crate::flight_log::trajectory::geodesy::Geodetic;
 
 /// Drone telemetry in drone time, with the samples that relate drone time to video time.
 #[derive(Debug)]

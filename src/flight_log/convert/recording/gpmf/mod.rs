@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 
 use super::mp4::Payload;
 use super::recorded::{Recorded, finite, nanoseconds};
-use crate::flight_log::geodesy::Geodetic;
+use crate::flight_log::trajectory::geodesy::Geodetic;
 use clock::{Mark, sample_times_ns};
 use items::{Item, Properties, items};
 use karma::Karma;

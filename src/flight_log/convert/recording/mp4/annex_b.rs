@@ -1,7 +1,7 @@
 //! Conversion of video units with length prefixes (ISO/IEC 14496-15) to a byte stream with start codes (Annex B).
 
-use super::super::super::super::video::VideoCodec;
 use super::boxes::u16_at;
+use crate::flight_log::messages::VideoCodec;
 
 const START_CODE: [u8; 4] = [0, 0, 0, 1];
 

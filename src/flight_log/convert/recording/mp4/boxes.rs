@@ -1,6 +1,6 @@
 //! Boxes of an MP4 file (ISO/IEC 14496-12): a size, a type of four letters, the content.
 
-use super::super::super::super::file::{FileWindow, LogFile};
+use crate::flight_log::container::file::{FileWindow, LogFile};
 
 /// Size of the header: size and type.
 const HEADER_BYTES: usize = 8;

@@ -8,12 +8,12 @@ mod track;
 
 use std::path::Path;
 
-use super::super::super::file::LogFile;
-use super::super::super::limits::LogLimits;
-use super::super::super::video::VideoCodec;
 use super::super::ConvertError;
 use super::candidates::Samples;
 use super::recorded::rate_hz;
+use crate::files::LogLimits;
+use crate::flight_log::container::file::LogFile;
+use crate::flight_log::messages::VideoCodec;
 use annex_b::UnitFormat;
 use boxes::{FileBox, child, children, descendant, file_boxes, u32_at, u64_at};
 use fragments::Fragments;

@@ -1,6 +1,6 @@
 //! Messages of users in H.264 and H.265 video: `user_data_unregistered` of supplemental enhancement information (SEI).
 
-use super::super::super::super::video::VideoCodec;
+use crate::flight_log::messages::VideoCodec;
 
 /// Payload type of `user_data_unregistered` (H.264, D.1.7; H.265, D.2.7).
 const UNREGISTERED: usize = 5;

@@ -1,7 +1,7 @@
 //! Records of a telemetry log: a time of the ground station, then a `MAVLink` frame of version 1 or 2.
 
-use super::super::super::super::file::{FileWindow, LogFile};
 use super::super::damage::Damage;
+use crate::flight_log::container::file::{FileWindow, LogFile};
 
 /// Size of the time before a frame: microseconds since the epoch, big-endian.
 const TIME_BYTES: usize = 8;

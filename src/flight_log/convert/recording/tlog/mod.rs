@@ -10,16 +10,16 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 
-use super::super::super::file::LogFile;
 use super::super::ConvertError;
 use super::super::sink::LogSink;
+use super::attitude::gimbal_attitude;
 use super::candidates::Preference;
-use super::mavlink_gimbal::gimbal_attitude;
 use super::recorded::{
     GimbalAttitude, GimbalFrame, Recorded, STANDARD_GRAVITY_M_PER_S2, finite, from_euler, nanoseconds, rotation,
 };
 use super::scalar::Scalar;
-use crate::flight_log::geodesy::Geodetic;
+use crate::flight_log::container::file::LogFile;
+use crate::flight_log::trajectory::geodesy::Geodetic;
 pub(super) use frames::is_telemetry;
 use frames::{Frame, Frames};
 use vehicles::Vehicle;

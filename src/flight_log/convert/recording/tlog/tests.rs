@@ -8,9 +8,10 @@ use tempfile::TempDir;
 use super::frames::{Frame, MAX_PAYLOAD_BYTES};
 use super::vehicles::{self, Vehicle};
 use super::{Recorded, described, id, take};
+use crate::files::LogLimits;
+use crate::flight_log::convert::options::TakenRecords;
 use crate::flight_log::convert::sink::LogSink;
-use crate::flight_log::convert::taken_records::TakenRecords;
-use crate::flight_log::{LogLimits, LogWriter, LogWriterOptions};
+use crate::flight_log::{LogWriter, LogWriterOptions};
 
 const START_NS: i64 = 1_700_000_000_000_000_000;
 

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use super::super::super::super::file::{FileWindow, LogFile};
 use super::super::damage::Damage;
+use crate::flight_log::container::file::{FileWindow, LogFile};
 
 /// First bytes of every log.
 pub(in super::super) const MAGIC: [u8; 7] = [0x55, 0x4C, 0x6F, 0x67, 0x01, 0x12, 0x35];

@@ -6,13 +6,13 @@ mod messages;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::super::super::file::LogFile;
 use super::super::ConvertError;
 use super::super::sink::LogSink;
+use super::attitude::gimbal_attitude;
 use super::damage::Damage;
-use super::mavlink_gimbal::gimbal_attitude;
 use super::recorded::{GimbalAttitude, GimbalFrame, Recorded, finite, from_euler, nanoseconds, rotation};
-use crate::flight_log::geodesy::Geodetic;
+use crate::flight_log::container::file::LogFile;
+use crate::flight_log::trajectory::geodesy::Geodetic;
 use formats::{Formats, MessageLayout};
 pub(super) use messages::MAGIC;
 use messages::{HEADER_BYTES, Messages};
