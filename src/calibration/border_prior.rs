@@ -3,7 +3,7 @@
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use super::chain_prior::{ChainTerm, square_root_information};
+use super::chain_prior::ChainTerm;
 use super::input::{CalibrationInput, EarlierFlights};
 use super::options::CalibrationOptions;
 use super::state::{BundleEstimate, Columns};
@@ -11,6 +11,7 @@ use crate::estimator::factors::factor::{Factor, JacobianBlock, Sink, WhitenedRow
 use crate::estimator::factors::kind::FactorLabel;
 use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::{Chain, ParameterId, auto_parameterization};
+use crate::optimization::prior_square_root_information;
 
 /// Expected values of the border with their information.
 #[derive(Clone, Debug)]
@@ -72,7 +73,7 @@ impl BorderTerm {
             chain: ChainTerm::with_covariance(given, of_chain),
             rig,
             rig_sigmas,
-            square_root_information: square_root_information(covariance),
+            square_root_information: prior_square_root_information(covariance),
         }
     }
 }

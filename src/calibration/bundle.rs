@@ -1,4 +1,7 @@
 //! Bundle adjustment: observations of both cameras, IMU samples between frame sets, encoder readings and priors.
+//!
+//! Cost: `Σ ρ(|π(T_WC⁻¹ X) − z|²/σ²) + Σ |r_IMU|² + Σ (q + q̇ s − reading)²/σ_q² + |r_start|² + |W (x ⊟ x₀)|²` over
+//! observations, intervals, joints, the first frame set and the border `x`; `s` is the gimbal camera's time offset.
 
 use std::collections::BTreeMap;
 

@@ -205,7 +205,14 @@ impl BundleEstimate {
         (self.world_from_imu(view, frame_sets, gravity) * self.imu_from_camera(view)).into()
     }
 
-    /// Jacobian of a view's pose with respect to the unknowns.
+    /// Jacobian of a view's pose `T_WC = [R', p']·T_IC` by the unknowns, for the image's delay `d` in the frame set with the
+    /// preintegrated motion `ΔR, Δp, Δv` and the time offset `s`:
+    /// `R' = R·ΔR·Exp(ω s)`, `p' = p + v (d + s) + R (Δp + Δv s) +` gravity.
+    ///
+    /// ```text
+    /// by φ:  [R_CI R'ᵀ R; −R' [t_IC]× R'ᵀ R − R [Δp + Δv s]×]     by p:  [0; I]     by v:  [0; (d + s) I]
+    /// by s:  [R_CI ω; v' − R' [t_IC]× ω]                          by [φ; δt] of T_IC:  [I, 0; 0, R']
+    /// ```
     pub(super) fn view_map(
         &self,
         view: ViewId,

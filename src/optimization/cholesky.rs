@@ -69,7 +69,7 @@ impl Cholesky {
         Arch::new().dispatch(Factorization { lower: &mut lower, count }).then_some(Self { order, lower })
     }
 
-    /// Memory of the factor, for a later one.
+    /// Buffer of this factor, to be reused.
     pub(crate) fn into_storage(self) -> Vec<f64> {
         self.lower
     }

@@ -24,7 +24,10 @@ pub(crate) use cholesky::{Cholesky, DIAGONAL_FLOOR};
 pub(crate) use landmark::Landmark;
 pub use landmark::LandmarkModel;
 pub(crate) use landmark_rows::{LandmarkRows, OBSERVATION_ROWS};
-pub(crate) use normal_equations::{NormalEquations, damp, fix, gauss_newton};
+pub(crate) use normal_equations::{
+    MIN_PRIOR_VARIANCE, NormalEquations, damp, fix, gauss_newton, prior_square_root_information,
+    square_root_information,
+};
 pub(crate) use pose_blocks::{BlockTerm, PoseBlocks, PoseBlocksOf};
 pub(crate) use reprojection::{CameraPose, RelativePose, RelativePoses, Reprojection};
 pub(crate) use robust_loss::LossSum;

@@ -5,7 +5,7 @@
 //! Least-Squares Estimation of Nonlinear Parameters*, 1963).
 
 use nalgebra::allocator::Allocator;
-use nalgebra::{DefaultAllocator, Dim, Dyn, OMatrix, OVector, Storage};
+use nalgebra::{DMatrix, DefaultAllocator, Dim, Dyn, OMatrix, OVector, Storage};
 
 use super::damped::DampedEquations;
 
@@ -112,6 +112,28 @@ where
     for unknown in 0..hessian.nrows() {
         hessian[(unknown, unknown)] *= 1.0 + damping;
     }
+}
+
+/// `W` (n × n, lower triangular) with `WᵀW = C⁻¹`, which whitens residuals of covariance `C`: the inverse of its Cholesky
+/// factor. `None` unless `C` is positive definite.
+pub(crate) fn square_root_information<D: Dim>(covariance: OMatrix<f64, D, D>) -> Option<OMatrix<f64, D, D>>
+where
+    DefaultAllocator: Allocator<D> + Allocator<D, D>,
+{
+    let (rows, columns) = covariance.shape_generic();
+    covariance.cholesky()?.unpack().solve_lower_triangular(&OMatrix::identity_generic(rows, columns))
+}
+
+/// Variance added to every unknown of a prior, so that its covariance stays regular when it fixes one.
+pub(crate) const MIN_PRIOR_VARIANCE: f64 = 1e-12;
+
+/// [`square_root_information`] of a prior with [`MIN_PRIOR_VARIANCE`]; of its diagonal alone if it is not positive definite.
+pub(crate) fn prior_square_root_information(mut covariance: DMatrix<f64>) -> DMatrix<f64> {
+    for unknown in 0..covariance.nrows() {
+        covariance[(unknown, unknown)] += MIN_PRIOR_VARIANCE;
+    }
+    let weights = covariance.diagonal().map(|variance| 1.0 / variance.sqrt());
+    square_root_information(covariance).unwrap_or_else(|| DMatrix::from_diagonal(&weights))
 }
 
 /// Gauss–Newton iterations: moves `estimate` by the steps `δ = −H⁻¹ g` of its normal equations, at most `iterations` of them.

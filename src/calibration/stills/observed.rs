@@ -20,6 +20,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Matrix6};
 use super::view_pose::{ViewPose, view_pose};
 use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::Chain;
+use crate::optimization::square_root_information;
 use crate::sensors::{StillSet, Stills};
 
 /// Set with refined camera poses.
@@ -98,7 +99,7 @@ impl ObservedSet {
             by_rigid.push(padded);
         }
         covariance += &by_gimbal * gimbal.covariance * by_gimbal.transpose();
-        let whitening = covariance.cholesky()?.l().solve_lower_triangular(&DMatrix::identity(rows, rows))?;
+        let whitening = square_root_information(covariance)?;
         Some(Self {
             index,
             id: set.id,

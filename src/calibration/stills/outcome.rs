@@ -119,6 +119,20 @@ pub struct StillsParameter {
     pub sigma_jackknife: Option<f64>,
 }
 
+impl StillsParameter {
+    /// Parameter with its initial and calibrated `values` and its formal standard deviation.
+    pub(super) fn new(
+        name: String,
+        dimension: Dimension,
+        [initial, value]: [f64; 2],
+        sigma_formal: f64,
+        sigma_jackknife: Option<f64>,
+    ) -> Self {
+        let sigma = sigma_jackknife.map_or(sigma_formal, |it| it.max(sigma_formal));
+        Self { name, dimension, initial, value, sigma, sigma_formal, sigma_jackknife }
+    }
+}
+
 /// Chain in one parameterization.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ParameterTable {

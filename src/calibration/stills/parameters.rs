@@ -85,15 +85,8 @@ fn table(
     let parameters = chain.parameters().into_iter().enumerate().map(|(place, id)| {
         let formal = covariance[(place, place)].max(0.0).sqrt();
         let sigma_jackknife = jackknife.as_ref().map(|sigmas| sigmas[place]);
-        StillsParameter {
-            name: names.name(id),
-            dimension: id.dimension(),
-            initial: id.principal_value(before[place]),
-            value: id.principal_value(values[place]),
-            sigma: sigma_jackknife.map_or(formal, |it| it.max(formal)),
-            sigma_formal: formal,
-            sigma_jackknife,
-        }
+        let values = [before[place], values[place]].map(|value| id.principal_value(value));
+        StillsParameter::new(names.name(id), id.dimension(), values, formal, sigma_jackknife)
     });
     ParameterTable { parameterization: parameterization.name(), parameters: parameters.collect() }
 }
@@ -161,15 +154,9 @@ pub(super) fn rigid_parameters(
             let column = dof + 6 * index + axis;
             let formal = fit.posterior.common[(column, column)].max(0.0).sqrt();
             let sigma_jackknife = jackknife.as_ref().map(|sigmas| sigmas[6 * index + axis]);
-            parameters.push(StillsParameter {
-                name: format!("{name}.{}", quantity.name()),
-                dimension: quantity.dimension(),
-                initial: before[axis],
-                value: values(transform)[axis],
-                sigma: sigma_jackknife.map_or(formal, |it| it.max(formal)),
-                sigma_formal: formal,
-                sigma_jackknife,
-            });
+            let name = format!("{name}.{}", quantity.name());
+            let values = [before[axis], values(transform)[axis]];
+            parameters.push(StillsParameter::new(name, quantity.dimension(), values, formal, sigma_jackknife));
         }
     }
     parameters

@@ -9,6 +9,7 @@ use super::observed::SetRows;
 use crate::estimator::{ColumnBlock, ColumnId, FrameId, Linearization};
 use crate::gimbal::{Chain, ParameterNames, Parameterization};
 use crate::observability::{RankReport, analyse, parameters_of};
+use crate::optimization::square_root_information;
 use crate::text::Named as _;
 
 /// Knowledge of the joint angles in an analysis.
@@ -188,7 +189,7 @@ fn map_whitening(loops: &StillsLoops<'_>, cameras: usize, places: &[usize], rows
         top += height;
     }
     covariance += &by_station * by_station.transpose();
-    covariance.cholesky()?.l().solve_lower_triangular(&DMatrix::identity(rows, rows))
+    square_root_information(covariance)
 }
 
 fn stacked(above: &DMatrix<f64>, below: &DMatrix<f64>) -> DMatrix<f64> {

@@ -14,7 +14,9 @@ use crate::estimator::state::navigation::{ImuBias, NavigationState};
 use crate::estimator::state::preintegration::Preintegration;
 use crate::geometry::{RigidTransform, so3, tangent_basis};
 use crate::optimization::damped::{DampedEquations as _, DampedOptions, DampedProblem, StopReason, minimize};
-use crate::optimization::{DensePoseEquations, NormalEquations, ReducedEquations, ReprojectionEquations, damp};
+use crate::optimization::{
+    DensePoseEquations, NormalEquations, ReducedEquations, ReprojectionEquations, damp, square_root_information,
+};
 
 /// Smallest standard deviation of a prior on the extrinsics, so that the equations stay solvable.
 const MIN_SIGMA: f64 = 1e-5;
@@ -228,8 +230,7 @@ impl<'a> Refinement<'a> {
                 let mut covariance: Matrix9 = increment.covariance().fixed_view::<9, 9>(0, 0).into_owned();
                 // Slightly larger diagonal, so that the covariance of a short interval stays positive definite.
                 damp(&mut covariance, 1e-9);
-                let lower = covariance.cholesky()?.unpack();
-                lower.solve_lower_triangular(&Matrix9::identity()).filter(|w| w.iter().all(|x| x.is_finite()))
+                square_root_information(covariance).filter(|w| w.iter().all(|x| x.is_finite()))
             })
             .collect::<Option<Vec<_>>>()?;
         let layout = RefinementLayout {

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 
 use crate::gimbal::{Chain, ClassicalChain, NearestForm, Parameterization, transport, transport_covariance};
+use crate::optimization::prior_square_root_information;
 
 /// Prior standard deviations of the given chain, for all parameters of its classical parameterization.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -94,17 +95,7 @@ impl GivenChain {
         covariance: DMatrix<f64>,
     ) -> Self {
         let prior_sigmas = covariance.diagonal().map(|variance| variance.max(0.0).sqrt());
-        // Regularizes columns that the prior fixes, which would make the covariance singular.
-        let floor = 1e-12;
-        let mut regular = covariance;
-        for k in 0..regular.nrows() {
-            regular[(k, k)] += floor;
-        }
-        let rows = regular.nrows();
-        let square_root_information = regular
-            .cholesky()
-            .and_then(|factor| factor.l().solve_lower_triangular(&DMatrix::identity(rows, rows)))
-            .unwrap_or_else(|| DMatrix::from_diagonal(&prior_sigmas.map(|sigma| 1.0 / sigma.max(1e-6))));
+        let square_root_information = prior_square_root_information(covariance);
         Self { classical: classical.clone(), chain, uncertainty, prior_sigmas, square_root_information }
     }
 

@@ -11,6 +11,7 @@ use super::imu_errors::{self, ImuErrors};
 
 pub use crate::estimator::state::navigation::{ImuBias, Matrix15, NavigationState, Vector15};
 use crate::geometry::{RigidTransform, seconds_from_ns, so3};
+use crate::optimization::square_root_information;
 use crate::sensors::{ImuNoise, ImuSample};
 
 /// Derivative of `[φ, p, v]` with respect to `[b_g, b_a]` (9 × 6).
@@ -271,8 +272,7 @@ impl Preintegration {
 
     /// Lower triangular `W` (15 × 15) with `Wᵀ W = covariance⁻¹`, `None` for an empty interval.
     pub fn square_root_information(&self) -> Option<Matrix15> {
-        let lower = self.covariance.cholesky()?.unpack();
-        let inverse = lower.solve_lower_triangular(&Matrix15::identity())?;
+        let inverse = square_root_information(self.covariance)?;
         inverse.iter().all(|x| x.is_finite()).then_some(inverse)
     }
 
