@@ -13,7 +13,7 @@ mod packed;
 mod problem;
 mod report;
 mod start;
-mod state;
+pub(crate) mod state;
 mod stationary;
 mod step_input;
 #[cfg(test)]

@@ -34,6 +34,14 @@ pub struct ImuNoise {
 }
 
 impl ImuNoise {
+    /// No noise: measurements taken as exact, or absent.
+    pub const ZERO: Self = Self {
+        accelerometer_noise_density: 0.0,
+        accelerometer_random_walk: 0.0,
+        gyroscope_noise_density: 0.0,
+        gyroscope_random_walk: 0.0,
+    };
+
     /// Noise with all densities multiplied by a factor.
     #[must_use]
     pub fn scaled(self, factor: f64) -> Self {

@@ -7,7 +7,6 @@ use nalgebra::{DMatrix, Vector3};
 
 use crate::camera::CameraModel;
 use crate::estimator::factors::reprojection::{Anchor, RobustWeight, VisualModel, whitened};
-use crate::estimator::problem::linearization::column_blocks;
 use crate::estimator::report::{FeatureReport, JacobianFactor, JacobianRow, JacobianSource, StepReport};
 use crate::estimator::state::camera_pose::{self, CameraCalibration, CameraMaps};
 use crate::estimator::state::camera_view::{CameraView, ROLLING_BLOCKS};
@@ -102,7 +101,7 @@ impl<'a> Writer<'a> {
             calibration: if source.calibrated { report.calibration.parameters.len() } else { 0 },
         };
         let numbers: Vec<FrameId> = report.window.iter().map(|frame| FrameId(frame.frame_index)).collect();
-        let mut columns = column_blocks(&layout, &report.calibration.parameters, &numbers);
+        let mut columns = layout.blocks(&report.calibration.parameters, &numbers);
         let start = columns.last().map_or(0, |last| last.start + last.len);
         columns.push(ColumnBlock { id: ColumnId::InverseDepth, start, len: 1 });
         let mut start = 0;

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::Vector3;
 
 use super::linearization::Linearization;
 use super::problem::{CameraFactors, Problem};
@@ -12,7 +12,7 @@ use crate::estimator::factors::reprojection::VisualModel;
 use crate::estimator::state::calibration::Calibration;
 use crate::estimator::state::calibrations::Calibrations;
 use crate::estimator::state::camera_pose;
-use crate::estimator::state::columns::{ColumnBlock, ColumnGroup, FrameId};
+use crate::estimator::state::columns::FrameId;
 use crate::estimator::state::estimate::Estimate;
 use crate::estimator::state::frame::{Frame, layout};
 use crate::estimator::state::frame_state::{FrameState, Rates};
@@ -146,13 +146,7 @@ impl HypotheticalWindow {
         let calibration = Calibrations::new(calibration, []);
         let estimate = Estimate { frames: states, calibration, landmarks: vec![landmarks] };
         let whole = problem.linearization(&estimate, &parameters, &numbers, None);
-        keeping(&whole, |group| match (group, &self.poses, &self.joints) {
-            (ColumnGroup::Joints, _, JointKnowledge::Known)
-            | (ColumnGroup::Pose | ColumnGroup::VelocityBias, PoseKnowledge::Known, _) => 0,
-            // Keeps the velocity; the biases follow it in the block.
-            (ColumnGroup::VelocityBias, PoseKnowledge::Imu { biases_known: true, .. }, _) => 3,
-            _ => usize::MAX,
-        })
+        whole.without_known(&self.poses, &self.joints)
     }
 
     fn frame(&self, slot: usize, hypothetical: &HypotheticalFrame) -> Frame {
@@ -162,7 +156,7 @@ impl HypotheticalWindow {
                 Preintegration::from_samples(*noise, navigation.bias, &hypothetical.imu)
             }
             PoseKnowledge::Imu { noise, .. } => Preintegration::new(*noise, navigation.bias),
-            PoseKnowledge::Known => Preintegration::new(NO_NOISE, navigation.bias),
+            PoseKnowledge::Known => Preintegration::new(ImuNoise::ZERO, navigation.bias),
         };
         let encoder = match self.joints {
             JointKnowledge::Encoder(sigma_rad) => Some(JointAngles {
@@ -213,36 +207,5 @@ impl HypotheticalWindow {
             }
         }
         (tracks, landmarks)
-    }
-}
-
-/// Noise of intervals without IMU measurements.
-const NO_NOISE: ImuNoise = ImuNoise {
-    accelerometer_noise_density: 0.0,
-    accelerometer_random_walk: 0.0,
-    gyroscope_noise_density: 0.0,
-    gyroscope_random_walk: 0.0,
-};
-
-/// Linearization reduced to the first columns of each block, as many as `count` returns for its group.
-fn keeping(whole: &Linearization, count: impl Fn(ColumnGroup) -> usize) -> Linearization {
-    let mut kept = Vec::new();
-    let mut columns = Vec::new();
-    for block in &whole.columns {
-        let len = block.len.min(count(block.id.group()));
-        if len > 0 {
-            columns.push(ColumnBlock { start: kept.len(), len, ..*block });
-            kept.extend(block.start..block.start + len);
-        }
-    }
-    let select = |matrix: &DMatrix<f64>| matrix.select_columns(&kept);
-    Linearization {
-        columns,
-        fixed_parameters: whole.fixed_parameters.clone(),
-        jacobian: select(&whole.jacobian),
-        prior_jacobian: select(&whole.prior_jacobian),
-        rig_prior_rows: whole.rig_prior_rows,
-        calibration_column_norms: whole.calibration_column_norms.clone(),
-        chain: whole.chain.clone(),
     }
 }

@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::hypothetical::{JointKnowledge, PoseKnowledge};
 use super::information_gain::CameraInformation;
 use super::problem::Problem;
 use crate::estimator::factors::kind::{FactorKind, FactorLabel};
@@ -10,13 +11,8 @@ use crate::estimator::factors::measurements::measurements;
 use crate::estimator::factors::projected_rows::NewestRows;
 use crate::estimator::state::calibrations::MAIN;
 use crate::estimator::state::camera_pose::CameraMaps;
-use crate::estimator::state::columns::ColumnBlock;
-use crate::estimator::state::columns::ColumnId;
-use crate::estimator::state::columns::FrameId;
+use crate::estimator::state::columns::{ColumnBlock, ColumnGroup, FrameId};
 use crate::estimator::state::estimate::Estimate;
-use crate::estimator::state::layout::Layout;
-use crate::estimator::state::layout::POSE;
-use crate::estimator::state::layout::VELOCITY_BIAS;
 use crate::gimbal::{Chain, ParameterId};
 
 /// Whitened linearization of the step at its final estimate, without the priors on the calibration.
@@ -42,44 +38,31 @@ pub struct Linearization {
     pub chain: Chain,
 }
 
-/// Column blocks of a linearization, in the order of the report.
-pub(crate) fn column_blocks(layout: &Layout, parameters: &[ParameterId], frames: &[FrameId]) -> Vec<ColumnBlock> {
-    let mut blocks = Vec::new();
-    let mut start = 0;
-    let mut push = |id: ColumnId, len: usize| {
-        if len > 0 {
-            blocks.push(ColumnBlock { id, start, len });
-            start += len;
+impl Linearization {
+    /// This linearization without the columns of known quantities.
+    pub(crate) fn without_known(&self, poses: &PoseKnowledge, joints: &JointKnowledge) -> Self {
+        let count = |group: ColumnGroup| match (group, poses, joints) {
+            (ColumnGroup::Joints, _, JointKnowledge::Known)
+            | (ColumnGroup::Pose | ColumnGroup::VelocityBias, PoseKnowledge::Known, _) => 0,
+            // Keeps the velocity; the biases follow it in the block.
+            (ColumnGroup::VelocityBias, PoseKnowledge::Imu { biases_known: true, .. }, _) => 3,
+            _ => usize::MAX,
+        };
+        let (mut kept, mut columns) = (Vec::new(), Vec::new());
+        for block in &self.columns {
+            let len = block.len.min(count(block.id.group()));
+            if len > 0 {
+                columns.push(ColumnBlock { start: kept.len(), len, ..*block });
+                kept.extend(block.start..block.start + len);
+            }
         }
-    };
-    if layout.calibration > 0 {
-        for parameter in parameters {
-            push(ColumnId::Calibration(*parameter), 1);
+        Self {
+            columns,
+            jacobian: self.jacobian.select_columns(&kept),
+            prior_jacobian: self.prior_jacobian.select_columns(&kept),
+            ..self.clone()
         }
     }
-    for frame in frames {
-        push(ColumnId::Joints(*frame), layout.joint_block());
-    }
-    for frame in frames {
-        push(ColumnId::Pose(*frame), POSE);
-    }
-    for frame in frames {
-        push(ColumnId::VelocityBias(*frame), VELOCITY_BIAS);
-    }
-    for frame in frames {
-        push(ColumnId::GimbalImu(*frame), layout.gimbal_imu);
-    }
-    blocks
-}
-
-/// Columns of the layout in the order of the report: calibration, joints, poses, velocities and biases.
-pub(crate) fn column_order(layout: &Layout) -> Vec<usize> {
-    let mut order: Vec<usize> = layout.calibration().collect();
-    order.extend((0..layout.frames).flat_map(|slot| layout.joints(slot).start..layout.joint_motion(slot).end));
-    order.extend((0..layout.frames).flat_map(|slot| layout.pose(slot)));
-    order.extend((0..layout.frames).flat_map(|slot| layout.velocity_bias(slot)));
-    order.extend((0..layout.frames).flat_map(|slot| layout.gimbal_imu(slot)));
-    order
 }
 
 impl Problem<'_> {
@@ -132,7 +115,7 @@ impl Problem<'_> {
         let is_fixed = |column: usize| frozen.contains(&column);
         let first = layout.calibration().start;
         let order: Vec<usize> =
-            column_order(&layout).into_iter().filter(|column| *column < first || !is_fixed(column - first)).collect();
+            layout.report_order().into_iter().filter(|column| *column < first || !is_fixed(column - first)).collect();
         let of = |fixed_parameters: bool| {
             let parameters =
                 parameters.iter().enumerate().filter(move |(column, _)| is_fixed(*column) == fixed_parameters);
@@ -141,7 +124,7 @@ impl Problem<'_> {
         let free = |column: &usize| !is_fixed(*column);
         let norms: Vec<f64> = (0..norms.len()).filter(free).map(|column| norms[column]).collect();
         Linearization {
-            columns: column_blocks(&layout, &of(false), numbers),
+            columns: layout.blocks(&of(false), numbers),
             fixed_parameters: of(true),
             jacobian: stack(measured.iter().chain(measured_rows.matrices()), order.iter().copied()),
             prior_jacobian: stack(priors.matrices(), order.iter().copied()),

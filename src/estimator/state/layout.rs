@@ -2,6 +2,9 @@
 
 use std::ops::Range;
 
+use super::columns::{ColumnBlock, ColumnId, FrameId};
+use crate::gimbal::ParameterId;
+
 /// Length of a pose block, `[φ, p]`.
 pub(crate) const POSE: usize = 6;
 /// Length of a velocity-bias block, `[v, b_g, b_a]`.
@@ -84,6 +87,35 @@ impl Layout {
             (0..self.frames).rev().flat_map(|slot| self.velocity_bias(slot).start..self.gimbal_imu(slot).end);
         let poses = (0..self.frames).flat_map(|slot| self.pose(slot).start..self.joint_motion(slot).end);
         velocities.chain(poses).chain(self.calibration()).collect()
+    }
+
+    /// Columns in the order of reports: calibration, joints, poses, velocities and biases, IMU on the gimbal.
+    pub(crate) fn report_order(&self) -> Vec<usize> {
+        let slots = || 0..self.frames;
+        let mut order: Vec<usize> = self.calibration().collect();
+        order.extend(slots().flat_map(|slot| self.joints(slot).start..self.joint_motion(slot).end));
+        order.extend(slots().flat_map(|slot| self.pose(slot)));
+        order.extend(slots().flat_map(|slot| self.velocity_bias(slot)));
+        order.extend(slots().flat_map(|slot| self.gimbal_imu(slot)));
+        order
+    }
+
+    /// Blocks of these columns; `frames` are by slot, and `parameters` those of the calibration.
+    pub(crate) fn blocks(&self, parameters: &[ParameterId], frames: &[FrameId]) -> Vec<ColumnBlock> {
+        let of_frames = |id: fn(FrameId) -> ColumnId, len: usize| frames.iter().map(move |frame| (id(*frame), len));
+        let parameters = if self.calibration > 0 { parameters } else { &[] };
+        let all = (parameters.iter().map(|parameter| (ColumnId::Calibration(*parameter), 1)))
+            .chain(of_frames(ColumnId::Joints, self.joint_block()))
+            .chain(of_frames(ColumnId::Pose, POSE))
+            .chain(of_frames(ColumnId::VelocityBias, VELOCITY_BIAS))
+            .chain(of_frames(ColumnId::GimbalImu, self.gimbal_imu));
+        let mut start = 0;
+        all.filter(|(_, len)| *len > 0)
+            .map(|(id, len)| {
+                start += len;
+                ColumnBlock { id, start: start - len, len }
+            })
+            .collect()
     }
 
     pub(crate) fn total(&self) -> usize {

@@ -7,14 +7,6 @@ use super::preintegration::Preintegration;
 use crate::geometry::{seconds_from_ns, so3};
 use crate::sensors::{ImuNoise, ImuSample};
 
-/// Zero noise: the measured motion over the rows of an image is treated as exact.
-const NO_NOISE: ImuNoise = ImuNoise {
-    accelerometer_noise_density: 0.0,
-    accelerometer_random_walk: 0.0,
-    gyroscope_noise_density: 0.0,
-    gyroscope_random_walk: 0.0,
-};
-
 /// Motion of the IMU after a stamp, integrated from its samples without gravity and initial velocity.
 ///
 /// It depends only on the samples, not on the state at the stamp, which adds pose, velocity and gyroscope bias.
@@ -64,7 +56,8 @@ impl MotionProfile {
     /// later than the previous one. `None` without a sample at the stamp.
     pub(crate) fn new(samples: &[ImuSample], bias: ImuBias, gravity_in_world: Vector3<f64>) -> Option<Self> {
         let first = samples.first()?;
-        let mut motion = Preintegration::new(NO_NOISE, bias);
+        // The measured motion over the rows of an image is treated as exact.
+        let mut motion = Preintegration::new(ImuNoise::ZERO, bias);
         let mut knots = Vec::with_capacity(samples.len());
         for sample in samples {
             let before = motion.samples().len();

@@ -128,6 +128,21 @@ impl Preintegration {
         Self { intrinsics, ..Self::new(noise, bias) }
     }
 
+    /// Interval whose motion, integrated without samples at `bias` and these intrinsics, is given with its derivatives and
+    /// its covariance.
+    pub(crate) fn of_motion(
+        bias: ImuBias,
+        duration_s: f64,
+        increment: MotionIncrement,
+        bias_jacobian: &BiasJacobian,
+        (errors, jacobian): (ImuErrors, IntrinsicsJacobian),
+        covariance: &Matrix15,
+    ) -> Self {
+        let intrinsics = Some(Box::new(IntegratedIntrinsics { errors, jacobian }));
+        let (bias_jacobian, covariance) = (*bias_jacobian, *covariance);
+        Self { duration_s, increment, bias_jacobian, intrinsics, covariance, ..Self::new(ImuNoise::ZERO, bias) }
+    }
+
     /// Integrates the samples of one interval, both ends included.
     pub fn from_samples(noise: ImuNoise, bias: ImuBias, samples: &[ImuSample]) -> Self {
         let mut preintegration = Self::new(noise, bias);

@@ -4,13 +4,13 @@ use nalgebra::Vector3;
 
 use super::mechanism::Mechanism;
 use super::motion::{LaboratoryMotion, MechanismMotion};
-use super::sensors::SensorColumns;
+use super::sensor_columns::SensorColumns;
 use crate::camera::{CameraModel, Distortion, Projection};
 use crate::estimator::{
     HypotheticalCameraImu, HypotheticalFrame, HypotheticalLandmark, HypotheticalWindow, JointKnowledge, PoseKnowledge,
     gravity_in_world,
 };
-use crate::geometry::{Dimension, SplitMix64};
+use crate::geometry::{Dimension, RigidTransform, SplitMix64};
 use crate::gimbal::{Chain, ParameterId, Parameterization};
 use crate::observability::RankReport;
 use crate::optimization::LandmarkModel;
@@ -91,7 +91,7 @@ const VIEW: [f64; 2] = [0.6, 0.45];
 /// A landmark is observed by every camera in front of which it lies by at least this depth.
 const MIN_DEPTH_M: f64 = 1.0;
 /// Prior standard deviations of the chain's parameters: 3 cm and 10°, the scale of the columns.
-const CHAIN_PRIOR: (f64, f64) = (Dimension::Length.scale(), Dimension::Angle.scale());
+pub(super) const CHAIN_PRIOR: (f64, f64) = (Dimension::Length.scale(), Dimension::Angle.scale());
 
 /// The IMU of an experiment without a rig: the ADIS16448 of the paper with the parameters of `RotorS`.
 pub const LABORATORY_IMU: ImuNoise = ImuNoise {
@@ -178,7 +178,10 @@ impl LaboratorySetup {
                 }),
             })
             .collect();
-        let landmarks = self.landmarks_of(&frames);
+        let camera_of = |frame: &HypotheticalFrame| {
+            frame.navigation.world_from_imu * self.mechanism.chain.imu_from_camera(&frame.joints_rad)
+        };
+        let landmarks = self.landmarks_of(&frames.iter().map(camera_of).collect::<Vec<_>>());
         HypotheticalWindow {
             camera: self.camera.clone(),
             frames,
@@ -192,14 +195,11 @@ impl LaboratorySetup {
         }
     }
 
-    /// Landmarks drawn in the views of all frames in turn, anchored in the first frame that observes them.
-    pub(super) fn landmarks_of(&self, frames: &[HypotheticalFrame]) -> Vec<HypotheticalLandmark> {
+    /// Landmarks drawn in the views of all cameras, `world_from_camera` by frame, in turn, anchored in the first frame that
+    /// observes them.
+    pub(super) fn landmarks_of(&self, cameras: &[RigidTransform]) -> Vec<HypotheticalLandmark> {
         let mut random = SplitMix64::new(1);
         let mut within = |low: f64, high: f64| low + (high - low) * random.next_unit();
-        let cameras: Vec<_> = frames
-            .iter()
-            .map(|frame| frame.navigation.world_from_imu * self.mechanism.chain.imu_from_camera(&frame.joints_rad))
-            .collect();
         (0..self.landmarks)
             .filter_map(|index| {
                 let ray = Vector3::new(within(-VIEW[0], VIEW[0]), within(-VIEW[1], VIEW[1]), 1.0);

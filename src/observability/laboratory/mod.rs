@@ -15,6 +15,7 @@ mod planning;
 mod predicted_window;
 mod report;
 mod run;
+mod sensor_columns;
 mod sensors;
 mod situation;
 mod spurious;
@@ -36,9 +37,9 @@ pub use planning::{
     plan_motion, scene_distances_m,
 };
 pub use report::LaboratoryReport;
+pub use sensor_columns::{SensorColumns, UnknownColumns};
 pub use sensors::{
-    ParameterSigmas, SensorColumns, SensorExcitation, SensorSurveyEntry, SensorSurveyRow, SensorSurveySection,
-    UnknownColumns, sensor_excitation,
+    ParameterSigmas, SensorExcitation, SensorSurveyEntry, SensorSurveyRow, SensorSurveySection, sensor_excitation,
 };
 pub use situation::Situation;
 pub use spurious::SpuriousRow;

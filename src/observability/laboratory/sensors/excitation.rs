@@ -6,8 +6,7 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::window::SensorWindow;
-use super::{LaboratoryForm, LaboratorySetup};
+use super::{LaboratoryForm, LaboratorySetup, linearize_sensors};
 use crate::gimbal::{ParameterGroup, ParameterId};
 use crate::observability::analysis::measured_block;
 use crate::observability::laboratory::LaboratoryMotion;
@@ -71,9 +70,7 @@ fn sigmas(
     motion: LaboratoryMotion,
 ) -> Option<(Vec<ParameterId>, Vec<f64>)> {
     let setup = LaboratorySetup { motion, ..setup.clone() };
-    let mut window = SensorWindow::new(&setup, form);
-    window.columns.sensors.retain(|(_, parameter)| setup.columns.has(*parameter));
-    let linearization = window.linearization(&window.truth)?;
+    let linearization = linearize_sensors(&setup, form)?;
     let block = measured_block(&linearization)?.block;
     let count = block.ncols();
     let covariance = (block.tr_mul(&block) + DMatrix::identity(count, count)).cholesky()?.inverse();

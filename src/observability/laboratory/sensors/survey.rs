@@ -7,8 +7,9 @@ use serde::Serialize;
 
 use super::experiments::{SECTIONS, SensorExperiment};
 use super::table::{SetRank, set_ranks};
-use super::{LaboratoryForm, SensorColumns};
+use super::LaboratoryForm;
 use crate::gimbal::{ParameterGroup, ParameterNames, Parameterization};
+use crate::observability::laboratory::SensorColumns;
 use crate::text::Named as _;
 
 /// Experiments with columns of sensors under one heading.

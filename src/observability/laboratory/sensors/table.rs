@@ -1,12 +1,13 @@
 //! Ranks of one experiment for several sets of sensor columns.
 
 use super::window::SensorWindow;
-use super::{LaboratoryForm, LaboratorySetup, SensorColumns};
+use super::{LaboratoryForm, LaboratorySetup};
 use crate::geometry::dense;
 use crate::gimbal::ParameterId;
 use crate::observability::CalibrationDirection;
 use crate::observability::analysis::measured_block;
 use crate::observability::directions::weak_directions;
+use crate::observability::laboratory::SensorColumns;
 
 /// Rank for one set of columns, those of the chain included.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,14 +28,15 @@ pub(crate) struct SetRank {
 ///
 /// The unknowns of the trajectory are projected out once for all sets.
 pub(crate) fn set_ranks(setup: &LaboratorySetup, form: LaboratoryForm, sets: &[SensorColumns]) -> Option<Vec<SetRank>> {
-    let window = SensorWindow::new(setup, form);
+    let window = SensorWindow::new(setup, form, SensorColumns::ALL);
     let linearization = window.linearization(&window.truth)?;
     let whole = measured_block(&linearization)?;
     let parameters: Vec<ParameterId> = linearization.columns.iter().filter_map(|block| block.id.parameter()).collect();
+    let chain = linearization.chain.dof();
     sets.iter()
         .map(|columns| {
             let kept: Vec<usize> = (0..parameters.len())
-                .filter(|column| *column < window.columns.chain || columns.has(parameters[*column]))
+                .filter(|column| *column < chain || columns.has(parameters[*column]))
                 .collect();
             let selected = whole.select(&linearization, &kept);
             let svd = dense::thin_svd(&selected.block)?;

@@ -7,11 +7,11 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::super::table::{SetRank, set_ranks};
-use super::super::{LaboratoryForm, LaboratorySetup, SensorColumns};
+use super::super::{LaboratoryForm, LaboratorySetup};
 use crate::camera::{CameraModel, Distortion, Projection};
 use crate::estimator::{JointKnowledge, PoseKnowledge};
 use crate::gimbal::{ParameterNames, Parameterization};
-use crate::observability::laboratory::{LABORATORY_IMU, LaboratoryMotion, Mechanism};
+use crate::observability::laboratory::{LABORATORY_IMU, LaboratoryMotion, Mechanism, SensorColumns};
 use crate::text::Named as _;
 
 /// One window of the golden file.

@@ -3,25 +3,25 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::super::state::SensorState;
+use super::super::LaboratoryForm;
 use super::super::table::set_ranks;
-use super::super::window::SensorWindow;
-use super::super::{LaboratoryForm, SensorColumns};
+use super::super::window::{SensorState, SensorWindow};
 use super::golden::{CASES, Case};
 use crate::geometry::dense;
 use crate::gimbal::Parameterization;
+use crate::observability::laboratory::SensorColumns;
 
 /// Length of a step in units of the column scale: 0.2°, 0.6 mm, 0.4 ms, 0.2 px, 0.02 % for the IMU.
 const STEP: f64 = 0.02;
 /// Relative size of a singular value that is treated as zero in a least-squares step.
 const ZERO: f64 = 1e-10;
 
-/// Minimum-norm change of all columns with the smallest linearized residual; the first `fixed` columns keep their
-/// change in `delta`.
-fn step(reduced: &DMatrix<f64>, delta: &DVector<f64>, fixed: usize) -> DVector<f64> {
-    let jacobian = reduced.columns_range(1..);
-    let target = -(reduced.column(0) + jacobian * delta);
-    let mut open = jacobian.columns_range(fixed..).into_owned();
+/// Minimum-norm change of all columns with the smallest linearized residual; the columns after the first `open` ones
+/// keep their change in `delta`.
+fn step(reduced: &DMatrix<f64>, delta: &DVector<f64>, open: usize) -> DVector<f64> {
+    let jacobian = reduced.columns(0, delta.len());
+    let target = -(reduced.column(delta.len()) + jacobian * delta);
+    let mut open = jacobian.columns(0, open).into_owned();
     // A column of rounding errors keeps a zero change.
     let largest = open.column_iter().map(|column| column.norm()).fold(0.0, f64::max);
     let scales: Vec<f64> =
@@ -36,7 +36,7 @@ fn step(reduced: &DMatrix<f64>, delta: &DVector<f64>, fixed: usize) -> DVector<f
     }
     let mut whole = delta.clone();
     for (index, change) in (&svd.v * along).iter().enumerate() {
-        whole[fixed + index] += change * scales[index];
+        whole[index] += change * scales[index];
     }
     whole
 }
@@ -44,9 +44,9 @@ fn step(reduced: &DMatrix<f64>, delta: &DVector<f64>, fixed: usize) -> DVector<f
 /// State after a step of the columns, with the landmarks that fit best.
 fn moved(window: &SensorWindow<'_>, state: &SensorState, delta: &DVector<f64>) -> SensorState {
     let rows = window.rows(state).unwrap();
-    let mut next = state.plus(&window.columns, delta.as_slice()).unwrap();
+    let mut next = state.plus(&window.layout, delta.as_slice());
     for (position, rows) in next.landmarks.iter_mut().zip(&rows) {
-        let target = -(&rows.residual + &rows.jacobian * delta);
+        let target = -(rows.residual() + rows.jacobian() * delta);
         let svd = dense::thin_svd(&rows.by_landmark).unwrap();
         for (index, singular) in svd.singular_values.iter().enumerate() {
             if *singular > ZERO * svd.singular_values[0] {
@@ -59,7 +59,7 @@ fn moved(window: &SensorWindow<'_>, state: &SensorState, delta: &DVector<f64>) -
 }
 
 fn residual(window: &SensorWindow<'_>, state: &SensorState) -> f64 {
-    window.rows(state).unwrap().iter().map(|rows| rows.residual.amax()).fold(0.0, f64::max)
+    window.rows(state).unwrap().iter().map(|rows| rows.residual().amax()).fold(0.0, f64::max)
 }
 
 /// Effect of a finite step along the null directions on the residuals.
@@ -78,7 +78,7 @@ fn move_along(case: &Case) -> Option<Moved> {
     let setup = case.setup();
     let form = LaboratoryForm::whole(Parameterization::Minimal);
     let ranks = set_ranks(&setup, form, &[sets]).unwrap();
-    let window = SensorWindow::new(&setup, form);
+    let window = SensorWindow::new(&setup, form, sets);
     let parameters = &ranks[0].parameters;
     if ranks[0].null.is_empty() {
         return None;
@@ -89,25 +89,25 @@ fn move_along(case: &Case) -> Option<Moved> {
         direction += DVector::from_column_slice(&null.weights) * weight;
     }
     direction.normalize_mut();
-    let count = window.columns.calibration();
+    let (first, total) = (window.layout.calibration().start, window.layout.total());
     let at_truth = window.reduced(&window.truth).unwrap();
     let given = |size: f64| {
-        let mut delta = DVector::zeros(window.columns.count());
+        let mut delta = DVector::zeros(total);
         for (column, parameter) in parameters.iter().enumerate() {
-            delta[column] = size * direction[column] * parameter.scale();
+            delta[first + column] = size * direction[column] * parameter.scale();
         }
         delta
     };
     let first_order = [STEP, 0.5 * STEP]
-        .map(|size| residual(&window, &moved(&window, &window.truth, &step(&at_truth, &given(size), count))));
-    let mut state = moved(&window, &window.truth, &step(&at_truth, &given(STEP), count));
-    let mut total = given(STEP).rows(0, count).into_owned();
+        .map(|size| residual(&window, &moved(&window, &window.truth, &step(&at_truth, &given(size), first))));
+    let mut state = moved(&window, &window.truth, &step(&at_truth, &given(STEP), first));
+    let mut moved_by = given(STEP).rows_range(first..).into_owned();
     for _ in 0..3 {
-        let delta = step(&window.reduced(&state).unwrap(), &DVector::zeros(window.columns.count()), 0);
-        total += delta.rows(0, count);
+        let delta = step(&window.reduced(&state).unwrap(), &DVector::zeros(total), total);
+        moved_by += delta.rows_range(first..);
         state = moved(&window, &state, &delta);
     }
-    let scaled = DVector::from_fn(count, |column, _| total[column] / parameters[column].scale());
+    let scaled = DVector::from_fn(parameters.len(), |column, _| moved_by[column] / parameters[column].scale());
     Some(Moved { first_order, followed: residual(&window, &state), remaining: scaled.dot(&direction) / STEP })
 }
 

@@ -55,17 +55,6 @@ impl SensorColumns {
     }
 }
 
-/// Every sensor column, in order: times, intrinsics of the camera, of the gyroscope, of the accelerometer.
-pub(super) fn all_parameters() -> Vec<ParameterId> {
-    let of = |part: ParameterPart| move |quantity: Quantity| ParameterId { part, quantity };
-    let mut parameters = vec![ParameterId::timeshift(0), ParameterId::readout(0), ParameterId::ENCODER_TIMESHIFT];
-    parameters.extend(Quantity::INTRINSICS.map(of(ParameterPart::Camera(0))));
-    parameters.extend(Quantity::SCALE_MISALIGNMENT.map(of(ParameterPart::Gyroscope)));
-    parameters.extend(Quantity::ROTATION.map(of(ParameterPart::Gyroscope)));
-    parameters.extend(Quantity::SCALE_MISALIGNMENT.map(of(ParameterPart::Accelerometer)));
-    parameters
-}
-
 impl FromStr for SensorColumns {
     type Err = UnknownColumns;
 
