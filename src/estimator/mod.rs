@@ -21,7 +21,7 @@ mod tests;
 mod window;
 
 pub use config::{
-    CameraSensorPrior, DEFAULT_CHAIN_PRIOR, EstimatorConfig, EstimatorOptions, INACCURATE_ROTATION_RAD,
+    CameraSensorPrior, DEFAULT_CHAIN_PRIOR, EstimatorConfig, EstimatorOptions,
     KEYFRAME_JOINT_INTERVAL_S, KEYFRAME_JOINT_RAD, RigidCamera, TrackContinuation, VisualLoss, imu_columns,
     imu_intrinsics, rigid_columns,
 };
@@ -42,6 +42,7 @@ pub use report::{
     PoseCovariance, ReportBytes, ResidualSummary, StageTimes, StepReport, StepWarning,
 };
 pub use state::allocation::allocated_bytes;
+pub use state::calibration::INACCURATE_ROTATION_RAD;
 pub use state::calibration_posterior::{CalibrationPosterior, CalibrationPrior, CameraPosterior};
 pub use state::columns::{ColumnBlock, ColumnGroup, ColumnId, FrameId};
 pub use state::earlier_pass::{BiasPrior, EarlierPass};

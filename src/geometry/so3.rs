@@ -18,13 +18,18 @@ pub fn exp(phi: &Vector3<f64>) -> UnitQuaternion<f64> {
 /// `R ⊞ φ = R·Exp(φ)`, normalized: the perturbation on the right, in the inner frame.
 #[must_use]
 pub fn plus(rotation: &UnitQuaternion<f64>, phi: &Vector3<f64>) -> UnitQuaternion<f64> {
-    UnitQuaternion::new_normalize((rotation * exp(phi)).into_inner())
+    composed(rotation, &exp(phi))
 }
 
 /// `Exp(φ)·R`, normalized: the left form that the paper's Eqs. 12–14 print, `φ` in the outer frame, `φ = R·φ_right`.
 #[must_use]
 pub fn plus_left(rotation: &UnitQuaternion<f64>, phi: &Vector3<f64>) -> UnitQuaternion<f64> {
-    UnitQuaternion::new_normalize((exp(phi) * rotation).into_inner())
+    composed(&exp(phi), rotation)
+}
+
+/// `R₁·R₂`, normalized: products of many rotations stay of unit length.
+pub fn composed(first: &UnitQuaternion<f64>, second: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
+    UnitQuaternion::new_normalize((first * second).into_inner())
 }
 
 /// Rotation vector (rad) of a body over `duration_s` whose angular rate (rad/s, body frame) changes linearly from

@@ -9,6 +9,6 @@ pub use estimator_config::{
 };
 pub(crate) use options::FIRST_KEYFRAME_INTERVAL_S;
 pub use options::{
-    EstimatorOptions, INACCURATE_ROTATION_RAD, KEYFRAME_JOINT_INTERVAL_S, KEYFRAME_JOINT_RAD, TrackContinuation,
+    EstimatorOptions, KEYFRAME_JOINT_INTERVAL_S, KEYFRAME_JOINT_RAD, TrackContinuation,
     VisualLoss,
 };

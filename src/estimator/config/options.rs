@@ -5,10 +5,6 @@ use nalgebra::Vector3;
 use crate::estimator::state::navigation::ImuBias;
 use crate::optimization::{LandmarkModel, RobustLoss};
 
-/// Standard deviation of the given chain rotations above which they are inaccurate, in radians: derivatives at the
-/// given chain have a relative error of the same size.
-pub const INACCURATE_ROTATION_RAD: f64 = 0.03;
-
 /// Rotation of a joint since the last keyframe above which a frame becomes a keyframe where rotations of the chain are
 /// given inaccurately, in radians: images that differ by joint angles alone measure the chain, without parallax.
 pub const KEYFRAME_JOINT_RAD: f64 = 0.05;

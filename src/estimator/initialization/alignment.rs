@@ -83,7 +83,7 @@ fn gyroscope_rotations(increments: &[Preintegration], bias: &Vector3<f64>) -> Ve
         let rotation_step = increment.corrected(&bias).rotation;
         let own: Matrix3<f64> = increment.bias_jacobian().fixed_view::<3, 3>(0, 0).into_owned();
         by_bias = rotation_step.inverse().to_rotation_matrix().into_inner() * by_bias + own;
-        rotation = UnitQuaternion::new_normalize((rotation * rotation_step).into_inner());
+        rotation = so3::composed(&rotation, &rotation_step);
         rotations.push((rotation, by_bias));
     }
     rotations

@@ -144,7 +144,7 @@ impl RefinedState {
             .zip(&self.per_view_rotations)
             .map(|(given, own)| {
                 RigidTransform::new(
-                    UnitQuaternion::new_normalize((self.common_rotation * given.rotation * own).into_inner()),
+                    so3::composed(&(self.common_rotation * given.rotation), own),
                     given.translation_m + self.common_shift,
                 )
             })

@@ -21,7 +21,7 @@ pub(super) fn guessed_rotations(
             let finite = steps.filter(|step| step.iter().all(|value| value.is_finite()));
             first_from_imu *= finite.fold(UnitQuaternion::identity(), |rotation, step| rotation * so3::exp(&step));
         }
-        rotations.push(UnitQuaternion::new_normalize((first_from_imu * frame.imu_from_camera.rotation).into_inner()));
+        rotations.push(so3::composed(&first_from_imu, &frame.imu_from_camera.rotation));
     }
     rotations
 }

@@ -12,11 +12,14 @@ use super::earlier_pass::FoundCamera;
 use super::given_chain::{EarlierPrior, GivenChain, GivenSigmas, PriorMeasurements};
 use super::sensor_columns::SensorColumn;
 use crate::camera::CameraModel;
-use crate::estimator::config::INACCURATE_ROTATION_RAD;
 use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::{
     Chain, ChainLinearization, ClassicalChain, ParameterId, ParameterPart, Parameterization, Quantity, transport,
 };
+
+/// Standard deviation of the given chain rotations above which they are inaccurate, in radians: derivatives at the
+/// given chain have a relative error of the same size.
+pub const INACCURATE_ROTATION_RAD: f64 = 0.03;
 
 #[derive(Clone, Debug, PartialEq)]
 struct Values {

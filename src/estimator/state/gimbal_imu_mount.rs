@@ -90,10 +90,9 @@ impl GimbalImuMount {
             return *state;
         }
         let (rate, acceleration) = motion(state, sample, gravity);
-        let rotation = state.world_from_imu.rotation * so3::exp(&(rate * self.shift_s));
         NavigationState {
             world_from_imu: RigidTransform::new(
-                UnitQuaternion::new_normalize(rotation.into_inner()),
+                so3::plus(&state.world_from_imu.rotation, &(rate * self.shift_s)),
                 state.world_from_imu.translation_m + state.velocity_m_per_s * self.shift_s,
             ),
             velocity_m_per_s: state.velocity_m_per_s + acceleration * self.shift_s,

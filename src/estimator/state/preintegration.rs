@@ -274,7 +274,7 @@ impl Preintegration {
         let rotation = start.world_from_imu.rotation;
         NavigationState {
             world_from_imu: RigidTransform::new(
-                UnitQuaternion::new_normalize((rotation * motion.rotation).into_inner()),
+                so3::composed(&rotation, &motion.rotation),
                 start.world_from_imu.translation_m
                     + start.velocity_m_per_s * t
                     + gravity_in_world * (0.5 * t * t)
@@ -390,7 +390,7 @@ impl Preintegration {
 
         self.increment.position_m += self.increment.velocity_m_per_s * h + r * dp;
         self.increment.velocity_m_per_s += r * dv;
-        self.increment.rotation = UnitQuaternion::new_normalize((self.increment.rotation * step_rotation).into_inner());
+        self.increment.rotation = so3::composed(&self.increment.rotation, &step_rotation);
         self.duration_s += h;
     }
 
