@@ -21,9 +21,8 @@ mod tests;
 mod window;
 
 pub use config::{
-    CameraSensorPrior, DEFAULT_CHAIN_PRIOR, EstimatorConfig, EstimatorOptions,
-    KEYFRAME_JOINT_INTERVAL_S, KEYFRAME_JOINT_RAD, RigidCamera, TrackContinuation, VisualLoss, imu_columns,
-    imu_intrinsics, rigid_columns,
+    CameraSensorPrior, DEFAULT_CHAIN_PRIOR, EstimatorConfig, EstimatorOptions, KEYFRAME_JOINT_INTERVAL_S,
+    KEYFRAME_JOINT_RAD, RigidCamera, TrackContinuation, VisualLoss, imu_columns, imu_intrinsics, rigid_columns,
 };
 pub use estimator::Estimator;
 pub use explain::{FeatureRows, StepJacobian};

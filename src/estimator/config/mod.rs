@@ -8,7 +8,4 @@ pub use estimator_config::{
     CameraSensorPrior, DEFAULT_CHAIN_PRIOR, EstimatorConfig, RigidCamera, imu_columns, imu_intrinsics, rigid_columns,
 };
 pub(crate) use options::FIRST_KEYFRAME_INTERVAL_S;
-pub use options::{
-    EstimatorOptions, KEYFRAME_JOINT_INTERVAL_S, KEYFRAME_JOINT_RAD, TrackContinuation,
-    VisualLoss,
-};
+pub use options::{EstimatorOptions, KEYFRAME_JOINT_INTERVAL_S, KEYFRAME_JOINT_RAD, TrackContinuation, VisualLoss};

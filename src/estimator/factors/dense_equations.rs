@@ -6,8 +6,8 @@ use super::factor::{Products, Sink, WhitenedRows};
 use super::kind::FactorLabel;
 use crate::estimator::state::layout::{POSE, VELOCITY_BIAS};
 
-/// Number of columns of an IMU factor without intrinsics: two frames, `[φ, p, v, b_g, b_a]` each.
-const IMU_COLUMNS: usize = 2 * (POSE + VELOCITY_BIAS);
+/// Width of a factor between the navigation states of two frames, the most frequent one.
+const TWO_STATES: usize = 2 * (POSE + VELOCITY_BIAS);
 
 /// `JᵀJ` (lower triangle at least) and `Jᵀr`.
 #[derive(Clone, Debug)]
@@ -69,7 +69,7 @@ impl DenseEquations {
         scratch.columns.extend(rows.columns());
         match scratch.columns.len() {
             // A constant width lets the compiler unroll the loops.
-            IMU_COLUMNS => scratch.multiply(rows, IMU_COLUMNS),
+            TWO_STATES => scratch.multiply(rows, TWO_STATES),
             width => scratch.multiply(rows, width),
         }
         let width = scratch.columns.len();
@@ -84,7 +84,7 @@ impl DenseEquations {
 
 impl Scratch {
     /// Computes the products of the blocks; sums run over the rows in their order.
-    #[expect(clippy::inline_always, reason = "the caller passes a constant width for the largest factor")]
+    #[expect(clippy::inline_always, reason = "the caller passes a constant width where it can")]
     #[inline(always)]
     fn multiply(&mut self, rows: &WhitenedRows<'_>, width: usize) {
         let height = rows.residual.len();

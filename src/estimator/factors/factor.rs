@@ -5,9 +5,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use super::kind::FactorLabel;
 use crate::estimator::state::estimate::Estimate;
 use crate::estimator::state::frame::Frame;
-use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::state::layout::Layout;
-use crate::geometry::RigidTransform;
 
 /// A factor of the least-squares problem: whitened residuals with their derivatives by columns of the layout.
 ///
@@ -85,14 +83,28 @@ pub(crate) struct Point<'a> {
     pub(crate) frames: &'a [Frame],
     /// Gravity in the world frame, in m/s².
     pub(crate) gravity_in_world: &'a Vector3<f64>,
-    /// Rig's `camera_from_imu1` of the IMU on the gimbal, `None` without one.
-    pub(crate) camera_from_gimbal_imu: Option<&'a RigidTransform>,
-    /// True if derivatives by the calibration are evaluated at its first estimate.
-    pub(crate) calibration_first_estimates: bool,
-    /// Estimate at which residuals are evaluated.
+    /// Values x at which residuals are evaluated.
     pub(crate) at: &'a Estimate,
-    /// States at which derivatives are evaluated, by slot.
-    pub(crate) linearized: &'a [FrameState],
+    /// Values at which derivatives are evaluated.
+    pub(crate) linearized: &'a Estimate,
+}
+
+impl Point<'_> {
+    /// `x ⊟ x₀` of all unknowns with a first estimate x₀, zero for the others (columns of the layout).
+    pub(crate) fn first_estimate_offset(&self) -> DVector<f64> {
+        let mut offset = DVector::zeros(self.layout.total());
+        for (slot, (frame, current)) in self.frames.iter().zip(&self.at.frames).enumerate() {
+            if let Some(first) = &frame.first_estimate {
+                offset.rows_range_mut(self.layout.frame(slot)).copy_from(&current.minus(first));
+            }
+        }
+        if self.layout.calibration > 0
+            && let Some(change) = self.at.calibration.first_estimate_offset()
+        {
+            offset.rows_range_mut(self.layout.calibration()).copy_from(&change);
+        }
+        offset
+    }
 }
 
 /// First columns of a navigation state `[φ, p | v | b_g, b_a]`.

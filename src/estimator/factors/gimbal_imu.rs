@@ -12,47 +12,53 @@ use nalgebra::{DMatrix, Vector3};
 use super::factor::{Factor, JacobianBlock, Point, Sink, WhitenedRows};
 use super::imu::{jacobians, residual};
 use super::kind::FactorLabel;
+use crate::estimator::state::calibration::Calibration;
 use crate::estimator::state::calibrations::MAIN;
 use crate::estimator::state::frame::InformedMotion;
+use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::state::gimbal_imu_mount::GimbalImuMount;
 use crate::estimator::state::layout::{POSE, VELOCITY_BIAS};
 use crate::estimator::state::navigation::{Matrix15, NavigationState, Vector15};
+use crate::sensors::ImuSample;
 
 /// States of the IMU on the gimbal by slot, with their derivatives.
 #[derive(Clone, Debug)]
 pub(crate) struct GimbalImuStates {
-    mount: GimbalImuMount,
-    current: Vec<NavigationState>,
-    /// Mount and states at the linearization point with the derivatives of their poses, by frame and by calibration;
-    /// `None` without derivatives.
-    linearized: Option<Linearized>,
+    current: MountedStates,
+    /// At the linearization point; `None` for sinks without derivatives.
+    linearized: Option<(MountedStates, Vec<PoseMaps>)>,
 }
 
+/// Derivatives of the IMU's pose by the frame's pose and joints (6 × (6 + N)), and by the calibration (6 × columns).
+type PoseMaps = (DMatrix<f64>, DMatrix<f64>);
+
 #[derive(Clone, Debug)]
-struct Linearized {
+struct MountedStates {
     mount: GimbalImuMount,
-    states: Vec<(NavigationState, DMatrix<f64>, DMatrix<f64>)>,
+    states: Vec<NavigationState>,
+}
+
+impl MountedStates {
+    fn new(frames: &[FrameState], calibration: &Calibration) -> Option<Self> {
+        let mount = GimbalImuMount::new(calibration)?;
+        let states = frames.iter().map(|frame| mount.state(frame, calibration)).collect::<Option<_>>()?;
+        Some(Self { mount, states })
+    }
 }
 
 impl GimbalImuStates {
     /// States of the frames before `slots`; `None` without such an IMU.
     pub(crate) fn new(point: &Point<'_>, slots: usize, derivatives: bool) -> Option<Self> {
-        let given = point.camera_from_gimbal_imu?;
-        let calibration = point.at.calibration.of(MAIN);
-        let mount = GimbalImuMount::new(given, calibration);
-        let current =
-            point.at.frames[..slots].iter().map(|frame| mount.state(frame, calibration)).collect::<Option<_>>()?;
-        let linearized = derivatives.then(|| {
-            let first = point.calibration_first_estimates.then(|| calibration.at_first_estimate());
-            let calibration = first.as_ref().unwrap_or(calibration);
-            let mount = GimbalImuMount::new(given, calibration);
-            let states = point.linearized[..slots].iter().map(|frame| {
-                let (by_frame, by_calibration) = mount.maps(frame, calibration);
-                Some((mount.state(frame, calibration)?, by_frame, by_calibration))
-            });
-            Some(Linearized { states: states.collect::<Option<_>>()?, mount })
-        });
-        Some(Self { mount, current, linearized: linearized.flatten() })
+        let current = MountedStates::new(&point.at.frames[..slots], point.at.calibration.of(MAIN))?;
+        let linearized = if derivatives {
+            let (frames, calibration) = (&point.linearized.frames[..slots], point.linearized.calibration.of(MAIN));
+            let at = MountedStates::new(frames, calibration)?;
+            let maps = frames.iter().map(|frame| at.mount.maps(frame, calibration)).collect();
+            Some((at, maps))
+        } else {
+            None
+        };
+        Some(Self { current, linearized })
     }
 }
 
@@ -62,6 +68,8 @@ pub(crate) struct GimbalImuFactor<'a> {
     /// Slot of the later frame.
     slot: usize,
     motion: &'a InformedMotion,
+    /// First and last sample of the interval.
+    ends: [&'a ImuSample; 2],
     information: &'a Matrix15,
     gravity_in_world: &'a Vector3<f64>,
     states: &'a GimbalImuStates,
@@ -74,7 +82,7 @@ pub(crate) struct GimbalImuFactor<'a> {
 /// Whitened derivatives of the rows.
 struct Derivatives {
     /// By pose and joints (15 × (6 + N)) and by velocity and biases (15 × 9) of the earlier and of the later frame.
-    by_frames: Vec<(DMatrix<f64>, DMatrix<f64>)>,
+    by_frames: [(DMatrix<f64>, DMatrix<f64>); 2],
     /// By the camera's calibration (15 × columns).
     by_calibration: DMatrix<f64>,
 }
@@ -87,6 +95,7 @@ impl<'a> GimbalImuFactor<'a> {
         Some(Self {
             slot,
             motion,
+            ends: [motion.samples().first()?, motion.samples().last()?],
             information: motion.information()?,
             gravity_in_world: point.gravity_in_world,
             states,
@@ -96,38 +105,42 @@ impl<'a> GimbalImuFactor<'a> {
     }
 
     /// States at the times of the measurements that bound the interval.
-    fn bounds(&self, mount: &GimbalImuMount, [from, to]: [&NavigationState; 2]) -> Option<[NavigationState; 2]> {
-        let samples = self.motion.samples();
-        let (first, last) = (samples.first()?, samples.last()?);
-        Some([mount.shifted(from, first, self.gravity_in_world), mount.shifted(to, last, self.gravity_in_world)])
+    fn bounds(&self, at: &MountedStates) -> [NavigationState; 2] {
+        [0, 1].map(|end| at.mount.shifted(&at.states[self.slot - 1 + end], self.ends[end], self.gravity_in_world))
     }
 
-    /// Derivatives at the linearization point.
-    fn derivatives(&self, linearized: &Linearized) -> Option<Derivatives> {
-        let ends = [&linearized.states[self.slot - 1], &linearized.states[self.slot]];
-        let [from, to] = self.bounds(&linearized.mount, ends.map(|(state, ..)| state))?;
+    /// Derivatives at the linearization point: those by the pose of the IMU, carried on by the chain.
+    fn derivatives(&self, at: &MountedStates, maps: &[PoseMaps]) -> Derivatives {
+        let [from, to] = self.bounds(at);
         let [by_from, by_to, _] = jacobians(self.motion, &from, &to, self.gravity_in_world, None);
-        let samples = self.motion.samples();
-        let mut by_calibration = DMatrix::zeros(15, ends[0].2.ncols());
+        let by_bounds = [by_from, by_to];
+        let mut by_calibration = DMatrix::zeros(15, maps[self.slot].1.ncols());
         let mut by_shift = Vector15::zeros();
-        let mut by_frames = Vec::with_capacity(2);
-        let ends_of_samples = [samples.first()?, samples.last()?];
-        for (((state, by_frame, of_calibration), sample), by_bound) in
-            ends.into_iter().zip(ends_of_samples).zip([by_from, by_to])
-        {
-            let (by_state, by_time) = linearized.mount.shift_maps(state, sample, self.gravity_in_world);
-            let by_bound = self.information * by_bound;
+        let by_frames = [0, 1].map(|end| {
+            let slot = self.slot - 1 + end;
+            let (by_frame, of_calibration) = &maps[slot];
+            let (by_state, by_time) = at.mount.shift_maps(&at.states[slot], self.ends[end], self.gravity_in_world);
+            let by_bound = self.information * by_bounds[end];
             by_shift += by_bound * by_time;
             let by_state = by_bound * by_state;
             let (by_pose, by_own) = by_state.as_slice().split_at(15 * POSE);
             let by_pose = DMatrix::from_column_slice(15, POSE, by_pose);
             by_calibration += &by_pose * of_calibration;
-            by_frames.push((by_pose * by_frame, DMatrix::from_column_slice(15, VELOCITY_BIAS, by_own)));
-        }
-        if let Some(column) = linearized.mount.shift_column {
+            (by_pose * by_frame, DMatrix::from_column_slice(15, VELOCITY_BIAS, by_own))
+        });
+        if let Some(column) = at.mount.shift_column {
             by_calibration.set_column(column, &by_shift);
         }
-        Some(Derivatives { by_frames, by_calibration })
+        Derivatives { by_frames, by_calibration }
+    }
+
+    /// Blocks of the derivatives in the columns of the layout.
+    fn blocks<'d>(&self, derivatives: &'d Derivatives) -> Vec<JacobianBlock<'d>> {
+        let by_frames = self.columns.iter().zip(&derivatives.by_frames);
+        let by_frames = by_frames.flat_map(|(columns, by)| [(columns.0, &by.0), (columns.1, &by.1)]);
+        let by_calibration = Some((self.calibration, &derivatives.by_calibration)).filter(|(_, it)| it.ncols() > 0);
+        let block = |(start, by): (usize, &'d DMatrix<f64>)| JacobianBlock { start, entries: by.as_slice() };
+        by_frames.chain(by_calibration).map(block).collect()
     }
 }
 
@@ -137,24 +150,10 @@ impl Factor for GimbalImuFactor<'_> {
     }
 
     fn rows<S: Sink>(&self, sink: &mut S) {
-        let current = [&self.states.current[self.slot - 1], &self.states.current[self.slot]];
-        let Some([from, to]) = self.bounds(&self.states.mount, current) else { return };
+        let [from, to] = self.bounds(&self.states.current);
         let residual = self.information * residual(self.motion, &from, &to, self.gravity_in_world, None);
-        let mut rows = WhitenedRows { residual: residual.as_slice(), blocks: &[], products: None };
-        if !S::DERIVATIVES {
-            return sink.add(self.label(), &rows);
-        }
-        let derivatives = self.states.linearized.as_ref().and_then(|linearized| self.derivatives(linearized));
-        let Some(Derivatives { by_frames, by_calibration }) = derivatives else { return };
-        let mut blocks = Vec::with_capacity(5);
-        for ((pose, own), (by_pose, by_own)) in self.columns.into_iter().zip(&by_frames) {
-            blocks.push(JacobianBlock { start: pose, entries: by_pose.as_slice() });
-            blocks.push(JacobianBlock { start: own, entries: by_own.as_slice() });
-        }
-        if by_calibration.ncols() > 0 {
-            blocks.push(JacobianBlock { start: self.calibration, entries: by_calibration.as_slice() });
-        }
-        rows.blocks = &blocks;
-        sink.add(self.label(), &rows);
+        let derivatives = self.states.linearized.as_ref().map(|(at, maps)| self.derivatives(at, maps));
+        let blocks = derivatives.as_ref().map_or_else(Vec::new, |derivatives| self.blocks(derivatives));
+        sink.add(self.label(), &WhitenedRows { residual: residual.as_slice(), blocks: &blocks, products: None });
     }
 }

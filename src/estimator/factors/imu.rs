@@ -45,7 +45,7 @@ impl<'a> ImuFactor<'a> {
             information: frame.motion.information()?,
             gravity_in_world: point.gravity_in_world,
             current: states(&point.at.frames),
-            linearized: states(point.linearized),
+            linearized: states(&point.linearized.frames),
             columns: [slot - 1, slot].map(|slot| NavigationColumns::of(layout, slot)),
             intrinsics: calibration.imu_errors().map(|errors| (errors, first)),
         })

@@ -200,9 +200,9 @@ pub(crate) struct MarginalPriorFactor<'a> {
 }
 
 impl<'a> MarginalPriorFactor<'a> {
-    /// Factor of the window; `first_estimate_offset` is `x ⊟ x₀` in the window's layout.
-    pub(crate) fn of(prior: &'a Prior, point: &Point<'_>, first_estimate_offset: &DVector<f64>) -> Self {
-        Self { prior, layout: point.layout, offset: prior.gather(&point.layout, first_estimate_offset) }
+    /// Factor of the window.
+    pub(crate) fn of(prior: &'a Prior, point: &Point<'_>) -> Self {
+        Self { prior, layout: point.layout, offset: prior.gather(&point.layout, &point.first_estimate_offset()) }
     }
 }
 

@@ -114,7 +114,9 @@ impl HypotheticalWindow {
     ) -> Linearization {
         let (translation_m, rotation_rad) = self.chain_prior;
         let sigmas = GivenSigmas { translation_m, rotation_rad };
-        let calibration = Calibration::new(chain, parameterization, sigmas, true, joint_offsets);
+        let has_imu = self.frames.first().is_some_and(|first| first.camera_imu.is_some());
+        let calibration = Calibration::new(chain, parameterization, sigmas, true, joint_offsets)
+            .with_given_gimbal_imu(has_imu.then(RigidTransform::identity));
         let frames: Vec<Frame> = self.frames.iter().enumerate().map(|(slot, it)| self.frame(slot, it)).collect();
         let states: Vec<FrameState> = frames.iter().map(|frame| frame.state.clone()).collect();
         let (tracks, landmarks) = self.tracks(&states, &calibration);
@@ -130,11 +132,6 @@ impl HypotheticalWindow {
             layout,
             cameras: vec![CameraFactors { visual, tracks: &tracks, columns: layout.calibration() }],
             gravity_in_world: self.gravity_in_world,
-            camera_from_gimbal_imu: self
-                .frames
-                .first()
-                .and_then(|first| first.camera_imu.as_ref())
-                .map(|_| RigidTransform::identity()),
             frames: &frames,
             prior: None,
             start: None,

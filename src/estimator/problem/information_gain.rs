@@ -17,7 +17,6 @@ use crate::estimator::factors::projected_rows::ProjectedRows;
 use crate::estimator::state::allocation::allocated_bytes;
 use crate::estimator::state::camera_pose::CameraMaps;
 use crate::estimator::state::estimate::Estimate;
-use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::state::layout::Layout;
 use crate::geometry::seconds_from_ns;
 use crate::optimization::{Cholesky, DIAGONAL_FLOOR};
@@ -160,9 +159,9 @@ impl Problem<'_> {
         let layout = self.layout;
         let (interval_s, free) = self.newest_interval(estimate)?;
         let newest = layout.frames - 1;
-        let frames = self.linearization_frames(estimate);
+        let linearized = self.linearization_point(estimate);
         let answer = |slots: usize| {
-            let mut hessian = self.other_equations(estimate, &frames, slots).hessian;
+            let mut hessian = self.other_equations(estimate, &linearized, slots).hessian;
             for (camera, information) in cameras.iter().enumerate() {
                 let poses = if slots == layout.frames { &information.with } else { &information.without };
                 let block = |row: usize, column: usize| poses.fixed_view::<6, 6>(6 * row, 6 * column).into_owned();
@@ -172,7 +171,7 @@ impl Problem<'_> {
         };
         let (with, without) = (answer(layout.frames)?, answer(newest)?);
         let covariance = &with.covariance;
-        let motion_terms = self.motion_terms(estimate, &frames, cameras, [&with, &without], &free);
+        let motion_terms = self.motion_terms(estimate, &linearized, cameras, [&with, &without], &free);
         // Diagonal of `P·G·P`.
         let before = without.covariance.clone().cholesky()?;
         let kept = covariance * before.solve(covariance);
@@ -213,13 +212,12 @@ impl Problem<'_> {
     fn motion_terms(
         &self,
         estimate: &Estimate,
-        frames: &[FrameState],
+        linearized: &Estimate,
         cameras: &[CameraInformation],
         [with, without]: [&Answer; 2],
         free: &[usize],
     ) -> DMatrix<f64> {
         let layout = self.layout;
-        let calibration = self.linearization_calibration(&estimate.calibration);
         let mut motion_terms = DMatrix::zeros(6 + layout.joints, free.len());
         // Effect of each motion on all parameters, for a change of one of them.
         let (with_p, without_p) = (&with.response * &with.covariance, &without.response * &with.covariance);
@@ -229,8 +227,10 @@ impl Problem<'_> {
             let moved = |answer: &DMatrix<f64>| camera_moves(layout, maps, &columns, answer);
             let force = &information.with * moved(&with_p) - &information.without * moved(&without_p);
             let own = with_p.rows_range(columns.clone());
-            let of_camera = calibration.of(camera);
-            for (motion, moves) in motion_parts(frames, of_camera, maps, layout.joints).into_iter().enumerate() {
+            let of_camera = linearized.calibration.of(camera);
+            for (motion, moves) in
+                motion_parts(&linearized.frames, of_camera, maps, layout.joints).into_iter().enumerate()
+            {
                 let moves = moves * own;
                 for column in 0..free.len() {
                     motion_terms[(motion, column)] += moves.column(column).dot(&force.column(column));
@@ -249,7 +249,7 @@ impl Problem<'_> {
         without: &DMatrix<f64>,
         motion_terms: &mut DMatrix<f64>,
     ) {
-        let point = self.point(estimate, &estimate.frames);
+        let point = self.point(estimate, estimate);
         let Some(clock) = EncoderFactor::clock(&point) else { return };
         let newest = self.layout.frames - 1;
         for slot in 0..self.layout.frames {

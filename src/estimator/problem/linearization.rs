@@ -76,13 +76,11 @@ impl Problem<'_> {
         mut seen: Option<&mut Vec<CameraInformation>>,
     ) -> Linearization {
         let layout = self.layout;
-        let frames = self.linearization_frames(estimate);
-        let calibration = self.linearization_calibration(&estimate.calibration);
+        let linearized = self.linearization_point(estimate);
         let mut measured = Vec::new();
         let mut norms = Vec::new();
         for camera in 0..self.cameras.len() {
-            let maps = CameraMaps::new(&frames, calibration.of(camera));
-            let linearized = self.view(camera, &frames, &calibration);
+            let maps = CameraMaps::new(&linearized.frames, linearized.calibration.of(camera));
             let apart = if seen.is_some() { NewestRows::Apart } else { NewestRows::Among };
             let projected = self.projected_rows(camera, estimate, &linearized, apart);
             measured.push(self.carried_rows(camera, &projected, &maps));
@@ -92,7 +90,7 @@ impl Problem<'_> {
                 seen.push(CameraInformation::new(&projected, maps));
             }
         }
-        let point = self.point(estimate, &frames);
+        let point = self.point(estimate, &linearized);
         let mut measured_rows = LabelledRows::new(layout.total());
         measurements(&point, layout.frames, &mut measured_rows);
         let own = || measured_rows.parts.iter().filter(|part| part.label.kind() == FactorKind::GimbalImu);
@@ -130,7 +128,7 @@ impl Problem<'_> {
             prior_jacobian: stack(priors.matrices(), order.iter().copied()),
             rig_prior_rows,
             calibration_column_norms: DVector::from_vec(norms),
-            chain: calibration.of(MAIN).chain().clone(),
+            chain: linearized.calibration.of(MAIN).chain().clone(),
         }
     }
 }

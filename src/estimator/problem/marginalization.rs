@@ -3,6 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::problem::Problem;
+use crate::estimator::factors::factor::Point;
 use crate::estimator::factors::kind::FactorLabel;
 use crate::estimator::factors::labelled_rows::{LabelledRows, stack};
 use crate::estimator::factors::marginal_prior::Prior;
@@ -15,8 +16,8 @@ use crate::estimator::state::frame::Frame;
 ///
 /// Its residuals refer to the first estimates: frames of the old prior keep theirs, others use the current estimate.
 pub(crate) fn oldest(problem: &Problem<'_>, estimate: &Estimate) -> Option<Prior> {
-    let frames = problem.linearization_frames(estimate);
-    let point = problem.point(estimate, &frames);
+    let linearized = problem.linearization_point(estimate);
+    let point = problem.point(estimate, &linearized);
     let (total, layout) = (problem.layout.total(), &problem.layout);
     // The rig's prior stays in the window.
     let mut priors = LabelledRows::of(total, |label| label != FactorLabel::CalibrationPrior);
@@ -25,9 +26,9 @@ pub(crate) fn oldest(problem: &Problem<'_>, estimate: &Estimate) -> Option<Prior
     measurements(&point, layout.frames.min(2), &mut measured);
     measured.parts.retain(|part| part.touches(&layout.frame(0)));
     measured.parts.sort_by_key(|part| part.touches(&layout.frame(1)));
-    let visual = problem.visual_rows(estimate);
+    let visual = problem.visual_rows(estimate, &linearized);
     let parts = priors.parts.iter().chain(&measured.parts).map(|part| &part.rows).chain([&visual]);
-    eliminated(problem, estimate, parts, 0)
+    eliminated(&point, parts, 0)
 }
 
 /// Prior without the frame at `slot`, including its encoder readings; its visual observations are
@@ -37,28 +38,24 @@ pub(crate) fn dropped(problem: &Problem<'_>, estimate: &Estimate, slot: usize) -
     if !prior.holds_frame(slot) {
         return Some(prior.clone());
     }
-    let frames = problem.linearization_frames(estimate);
+    let linearized = problem.linearization_point(estimate);
+    let point = problem.point(estimate, &linearized);
     let label = FactorLabel::Encoder(slot as u16);
     let mut readings = LabelledRows::of(problem.layout.total(), |wanted| wanted == label);
-    measurements(&problem.point(estimate, &frames), slot + 1, &mut readings);
-    let carried = prior.rows(&problem.layout, &problem.first_estimate_offset(estimate));
+    measurements(&point, slot + 1, &mut readings);
+    let carried = prior.rows(&problem.layout, &point.first_estimate_offset());
     let parts = [&carried].into_iter().chain(readings.parts.iter().map(|part| &part.rows));
-    eliminated(problem, estimate, parts, slot)
+    eliminated(&point, parts, slot)
 }
 
 /// Converts rows with residuals at the current estimate to a prior at the first estimates.
-fn eliminated<'a>(
-    problem: &Problem<'_>,
-    estimate: &Estimate,
-    parts: impl Iterator<Item = &'a DMatrix<f64>>,
-    slot: usize,
-) -> Option<Prior> {
-    let total = problem.layout.total();
+fn eliminated<'a>(point: &Point<'_>, parts: impl Iterator<Item = &'a DMatrix<f64>>, slot: usize) -> Option<Prior> {
+    let total = point.layout.total();
     let mut rows = stack(parts, 0..=total);
-    let shift = rows.columns(0, total) * problem.first_estimate_offset(estimate);
+    let shift = rows.columns(0, total) * point.first_estimate_offset();
     let mut residual = rows.column_mut(total);
     residual -= shift;
-    Prior::eliminating(&rows, &problem.layout, slot)
+    Prior::eliminating(&rows, &point.layout, slot)
 }
 
 /// Sets missing first estimates of frames in the prior to the current state; removes those of frames outside.

@@ -4,26 +4,22 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector, Vector3, Vector6};
 
-use crate::estimator::factors::calibration_prior::CalibrationPriorFactor;
 use crate::estimator::factors::costs::Costs;
 use crate::estimator::factors::dense_equations::DenseEquations;
 use crate::estimator::factors::factor::{Point, Sink};
 use crate::estimator::factors::kind::FactorKind;
-use crate::estimator::factors::marginal_prior::{MarginalPriorFactor, Prior};
-use crate::estimator::factors::measurements::measurements;
+use crate::estimator::factors::marginal_prior::Prior;
+use crate::estimator::factors::measurements::{measurements, priors};
 use crate::estimator::factors::reprojection::{
     self, ReducedVisualEquations, VisualEquations, VisualFactors, VisualModel,
 };
-use crate::estimator::factors::start_prior::{GimbalImuStartFactor, StartPrior, StartPriorFactor};
-use crate::estimator::state::calibrations::Calibrations;
+use crate::estimator::factors::start_prior::StartPrior;
 use crate::estimator::state::camera_pose::CameraMaps;
 use crate::estimator::state::camera_view::CameraView;
 use crate::estimator::state::estimate::Estimate;
 use crate::estimator::state::frame::Frame;
-use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::state::layout::Layout;
 use crate::estimator::state::track::Track;
-use crate::geometry::RigidTransform;
 use crate::optimization::Landmark;
 
 #[derive(Clone, Debug)]
@@ -40,8 +36,6 @@ pub(crate) struct Problem<'a> {
     /// Cameras have no common features, so each has a separate visual system.
     pub(crate) cameras: Vec<CameraFactors<'a>>,
     pub(crate) gravity_in_world: Vector3<f64>,
-    /// Rig's `camera_from_imu1` of the IMU on the gimbal, `None` without one.
-    pub(crate) camera_from_gimbal_imu: Option<RigidTransform>,
     pub(crate) frames: &'a [Frame],
     pub(crate) prior: Option<&'a Prior>,
     pub(crate) start: Option<&'a StartPrior>,
@@ -66,114 +60,83 @@ pub(crate) struct NormalEquations {
 }
 
 impl Problem<'_> {
-    /// States at which derivatives are evaluated.
-    pub(crate) fn linearization_frames(&self, estimate: &Estimate) -> Vec<FrameState> {
-        self.frames
-            .iter()
-            .zip(&estimate.frames)
-            .map(|(frame, current)| frame.linearization_point(current, self.first_estimate_reach_rad).clone())
-            .collect()
+    /// Values at which derivatives are evaluated, without landmarks: first estimates where a state is near enough to its
+    /// own, and for the calibration if configured, else those of `estimate`.
+    pub(crate) fn linearization_point(&self, estimate: &Estimate) -> Estimate {
+        let frames = self.frames.iter().zip(&estimate.frames);
+        let reach_rad = self.first_estimate_reach_rad;
+        let calibration = &estimate.calibration;
+        Estimate {
+            frames: frames.map(|(frame, current)| frame.linearization_point(current, reach_rad).clone()).collect(),
+            calibration: if self.calibration_first_estimates {
+                calibration.at_first_estimate()
+            } else {
+                calibration.clone()
+            },
+            landmarks: Vec::new(),
+        }
     }
 
-    /// Camera at the given frames and calibrations.
-    pub(crate) fn view<'v>(
-        &'v self,
-        camera: usize,
-        frames: &'v [FrameState],
-        calibrations: &'v Calibrations,
-    ) -> CameraView<'v> {
-        CameraView::new(frames, calibrations.of(camera), self.cameras[camera].visual.camera)
+    /// Camera at the states and the calibration of an estimate.
+    pub(crate) fn view<'v>(&'v self, camera: usize, estimate: &'v Estimate) -> CameraView<'v> {
+        CameraView::new(&estimate.frames, estimate.calibration.of(camera), self.cameras[camera].visual.camera)
     }
 
     /// Factors' input: residuals at `estimate`, derivatives at `linearized`.
-    pub(crate) fn point<'p>(&'p self, estimate: &'p Estimate, linearized: &'p [FrameState]) -> Point<'p> {
+    pub(crate) fn point<'p>(&'p self, estimate: &'p Estimate, linearized: &'p Estimate) -> Point<'p> {
         Point {
             layout: self.layout,
             frames: self.frames,
             gravity_in_world: &self.gravity_in_world,
-            camera_from_gimbal_imu: self.camera_from_gimbal_imu.as_ref(),
-            calibration_first_estimates: self.calibration_first_estimates,
             at: estimate,
             linearized,
         }
     }
 
     pub(crate) fn priors(&self, point: &Point<'_>, sink: &mut impl Sink) {
-        sink.take(CalibrationPriorFactor::of(point));
-        if let Some(prior) = self.prior {
-            sink.take(Some(MarginalPriorFactor::of(prior, point, &self.first_estimate_offset(point.at))));
-        }
-        sink.take(self.start.and_then(|start| StartPriorFactor::of(start, point)));
-        sink.take(self.start.and_then(|start| GimbalImuStartFactor::of(start, point)));
+        priors(point, self.prior, self.start, sink);
     }
 
     /// Costs by kind of factor.
     pub(crate) fn costs(&self, estimate: &Estimate) -> Costs {
         let mut costs = Costs::default();
         for (camera, (factors, landmarks)) in self.cameras.iter().zip(&estimate.landmarks).enumerate() {
-            let view = self.view(camera, &estimate.frames, &estimate.calibration);
+            let view = self.view(camera, estimate);
             let squared = 2.0 * reprojection::cost(&factors.visual, &view, factors.tracks, landmarks);
             let observations: usize = factors.tracks.iter().map(|track| track.observations.len()).sum();
             costs.add_to(FactorKind::Visual, squared, 2 * observations);
         }
-        let point = self.point(estimate, &estimate.frames);
+        let point = self.point(estimate, estimate);
         measurements(&point, self.frames.len(), &mut costs);
         self.priors(&point, &mut costs);
         costs
     }
 
-    /// `x ⊟ x₀` of all unknowns with a first estimate, zero for the others (columns of the layout).
-    pub(crate) fn first_estimate_offset(&self, estimate: &Estimate) -> DVector<f64> {
-        let mut first_estimate_offset = DVector::zeros(self.layout.total());
-        for (slot, (frame, current)) in self.frames.iter().zip(&estimate.frames).enumerate() {
-            if let Some(first) = &frame.first_estimate {
-                first_estimate_offset.rows_range_mut(self.layout.frame(slot)).copy_from(&current.minus(first));
-            }
-        }
-        if self.layout.calibration > 0
-            && let Some(change) = estimate.calibration.first_estimate_offset()
-        {
-            first_estimate_offset.rows_range_mut(self.layout.calibration()).copy_from(&change);
-        }
-        first_estimate_offset
-    }
-
-    /// Calibration at which derivatives are evaluated.
-    pub(crate) fn linearization_calibration(&self, current: &Calibrations) -> Calibrations {
-        if self.calibration_first_estimates { current.at_first_estimate() } else { current.clone() }
-    }
-
     pub(crate) fn linearize(&self, estimate: &Estimate) -> NormalEquations {
-        let frames = self.linearization_frames(estimate);
-        let calibration = self.linearization_calibration(&estimate.calibration);
+        let point = self.linearization_point(estimate);
         let cameras = self
             .cameras
             .iter()
             .zip(&estimate.landmarks)
             .enumerate()
             .map(|(camera, (factors, landmarks))| {
-                let current = &self.view(camera, &estimate.frames, &estimate.calibration);
-                let linearized = &self.view(camera, &frames, &calibration);
+                let current = &self.view(camera, estimate);
+                let linearized = &self.view(camera, &point);
                 let (model, tracks) = (&factors.visual, factors.tracks);
                 CameraEquations {
                     visual: VisualFactors { model, current, linearized, tracks, landmarks }.equations(),
-                    maps: CameraMaps::new(&frames, calibration.of(camera)),
+                    maps: CameraMaps::new(&point.frames, point.calibration.of(camera)),
                     columns: factors.columns.clone(),
                 }
             })
             .collect();
-        let others = self.other_equations(estimate, &frames, self.frames.len());
+        let others = self.other_equations(estimate, &point, self.frames.len());
         NormalEquations { cameras, others }
     }
 
     /// Normal equations of the measurements of the frames before `slots`, without reprojections, and of the priors;
-    /// derivatives by the frames' states at `linearized`.
-    pub(crate) fn other_equations(
-        &self,
-        estimate: &Estimate,
-        linearized: &[FrameState],
-        slots: usize,
-    ) -> DenseEquations {
+    /// derivatives at `linearized`.
+    pub(crate) fn other_equations(&self, estimate: &Estimate, linearized: &Estimate, slots: usize) -> DenseEquations {
         let mut equations = DenseEquations::zeros(self.layout.total());
         let point = self.point(estimate, linearized);
         measurements(&point, slots, &mut equations);

@@ -7,20 +7,16 @@ use crate::estimator::factors::labelled_rows::stack;
 use crate::estimator::factors::projected_rows::{NewestRows, ProjectedRows};
 use crate::estimator::factors::reprojection::VisualFactors;
 use crate::estimator::state::camera_pose::CameraMaps;
-use crate::estimator::state::camera_view::CameraView;
 use crate::estimator::state::estimate::Estimate;
 
 impl Problem<'_> {
     /// Rows of the reprojection factors after elimination of the landmarks; at most `6·frames` rows per camera.
-    pub(crate) fn visual_rows(&self, estimate: &Estimate) -> DMatrix<f64> {
-        let frames = self.linearization_frames(estimate);
-        let calibration = self.linearization_calibration(&estimate.calibration);
+    pub(crate) fn visual_rows(&self, estimate: &Estimate, linearized: &Estimate) -> DMatrix<f64> {
         let seeing = (0..self.cameras.len()).filter(|camera| !self.cameras[*camera].tracks.is_empty());
         let rows: Vec<DMatrix<f64>> = seeing
             .map(|camera| {
-                let maps = CameraMaps::new(&frames, calibration.of(camera));
-                let linearized = self.view(camera, &frames, &calibration);
-                let projected = self.projected_rows(camera, estimate, &linearized, NewestRows::Among);
+                let maps = CameraMaps::new(&linearized.frames, linearized.calibration.of(camera));
+                let projected = self.projected_rows(camera, estimate, linearized, NewestRows::Among);
                 self.carried_rows(camera, &projected, &maps)
             })
             .collect();
@@ -32,11 +28,11 @@ impl Problem<'_> {
         &self,
         camera: usize,
         estimate: &Estimate,
-        linearized: &CameraView<'_>,
+        linearized: &Estimate,
         apart: NewestRows,
     ) -> ProjectedRows {
         let CameraFactors { visual: model, tracks, .. } = &self.cameras[camera];
-        let current = &self.view(camera, &estimate.frames, &estimate.calibration);
+        let (current, linearized) = (&self.view(camera, estimate), &self.view(camera, linearized));
         let landmarks = &estimate.landmarks[camera];
         ProjectedRows::new(&VisualFactors { model, current, linearized, tracks, landmarks }, apart)
     }

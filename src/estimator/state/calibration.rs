@@ -56,6 +56,8 @@ pub(crate) struct Calibration {
     sensors: Arc<[SensorColumn]>,
     /// Readout time of the rig, in seconds.
     given_readout_s: f64,
+    /// Rig's `camera_from_imu1` of the IMU on the gimbal, `None` without one.
+    given_gimbal_imu: Option<RigidTransform>,
     first_estimate: Option<Values>,
     free: bool,
     /// Parameters fixed at their values; the parameterization may still change.
@@ -78,6 +80,7 @@ impl Calibration {
             given: Arc::new(given),
             sensors: Arc::default(),
             given_readout_s: 0.0,
+            given_gimbal_imu: None,
             first_estimate: None,
             free,
             frozen: Vec::new(),
@@ -206,6 +209,11 @@ impl Calibration {
         Self { given_readout_s, ..self }
     }
 
+    /// Rig's `camera_from_imu1` of the IMU on the gimbal.
+    pub(crate) fn with_given_gimbal_imu(self, given_gimbal_imu: Option<RigidTransform>) -> Self {
+        Self { given_gimbal_imu, ..self }
+    }
+
     pub(crate) fn chain(&self) -> &Chain {
         &self.values.chain
     }
@@ -241,6 +249,11 @@ impl Calibration {
 
     pub(crate) fn encoder_shift_column(&self) -> Option<usize> {
         self.sensor_column(ParameterId::ENCODER_TIMESHIFT)
+    }
+
+    /// Rig's `camera_from_imu1` of the IMU on the gimbal, `None` without one.
+    pub(crate) fn given_gimbal_imu(&self) -> Option<&RigidTransform> {
+        self.given_gimbal_imu.as_ref()
     }
 
     /// Corrections of the orientation of the IMU on the gimbal, as a rotation vector, and of its position in the camera's

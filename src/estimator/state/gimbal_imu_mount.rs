@@ -1,6 +1,6 @@
 //! Pose of the IMU on the gimbal through the chain, with its derivatives.
 
-use nalgebra::{DMatrix, Matrix3, UnitQuaternion, Vector3};
+use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::calibration::Calibration;
 use super::camera_pose::camera_map;
@@ -25,10 +25,12 @@ pub(crate) struct GimbalImuMount {
 }
 
 impl GimbalImuMount {
-    pub(crate) fn new(given: &RigidTransform, calibration: &Calibration) -> Self {
+    /// Mount of a camera's calibration, `None` without such an IMU.
+    pub(crate) fn new(calibration: &Calibration) -> Option<Self> {
+        let given = calibration.given_gimbal_imu()?;
         let [rotation_vector, offset_m] = calibration.gimbal_imu_correction();
         let free = calibration.dof() > 0;
-        Self {
+        Some(Self {
             camera_from_imu: RigidTransform::new(
                 given.rotation * so3::exp(&rotation_vector),
                 given.translation_m + offset_m,
@@ -37,7 +39,7 @@ impl GimbalImuMount {
             shift_s: calibration.gimbal_imu_shift_s(),
             pose_column: calibration.gimbal_imu_pose_column().filter(|_| free),
             shift_column: calibration.gimbal_imu_shift_column().filter(|_| free),
-        }
+        })
     }
 
     /// State of the IMU at the stamp of a frame; `None` without such an IMU.

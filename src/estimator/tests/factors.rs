@@ -31,7 +31,7 @@ fn sinks_agree_on_the_factors_of_a_window() {
         let total = problem.layout.total();
         let rows = fixture::rows(&problem, &estimate, |_| true);
         let equations =
-            problem.other_equations(&estimate, &problem.linearization_frames(&estimate), problem.layout.frames);
+            problem.other_equations(&estimate, &problem.linearization_point(&estimate), problem.layout.frames);
         let (jacobian, residual) = (rows.columns(0, total), rows.column(total));
         let (hessian, gradient) = (jacobian.tr_mul(&jacobian), jacobian.tr_mul(&residual));
         let scale = hessian.amax();
@@ -94,7 +94,7 @@ fn sinks_take_a_factor_that_they_do_not_know() {
     let (_, estimator) = windows().into_iter().next().unwrap();
     let problem = estimator.problem(&[]);
     let estimate = estimator.estimate(&[]);
-    let point = problem.point(&estimate, &estimate.frames);
+    let point = problem.point(&estimate, &estimate);
     let total = problem.layout.total();
     let factor = HeightFactor::of(&point).unwrap();
     let [height, climb] = factor.columns;

@@ -303,7 +303,7 @@ pub(super) fn disturb(test: &mut TestWindow, scale: f64) {
 /// Rows `[columns of the layout | residual]` of the wanted factors, reprojections excepted.
 pub(super) fn rows(problem: &Problem<'_>, estimate: &Estimate, wanted: impl Fn(FactorLabel) -> bool) -> DMatrix<f64> {
     let total = problem.layout.total();
-    let linearized = problem.linearization_frames(estimate);
+    let linearized = problem.linearization_point(estimate);
     let point = problem.point(estimate, &linearized);
     let mut rows = LabelledRows::of(total, wanted);
     measurements(&point, problem.layout.frames, &mut rows);

@@ -49,13 +49,12 @@ fn the_terms_of_the_motions_sum_to_the_calibration_jacobian() {
         let active = estimator.active_tracks();
         let problem = estimator.problem(&active);
         let estimate = estimator.estimate(&active);
-        let frames = problem.linearization_frames(&estimate);
-        let calibrations = problem.linearization_calibration(&estimate.calibration);
+        let linearized = problem.linearization_point(&estimate);
+        let frames = &linearized.frames;
         for camera in 0..problem.cameras.len() {
-            let calibration = calibrations.of(camera);
-            let maps = CameraMaps::new(&frames, calibration);
-            let linearized = problem.view(camera, &frames, &calibrations);
-            let parts = motion_parts(&frames, calibration, &maps, problem.layout.joints);
+            let calibration = linearized.calibration.of(camera);
+            let maps = CameraMaps::new(frames, calibration);
+            let parts = motion_parts(frames, calibration, &maps, problem.layout.joints);
             let sum = parts.iter().fold(DMatrix::zeros(6 * frames.len(), calibration.dof()), |sum, part| sum + part);
             let mut whole = DMatrix::zeros(6 * frames.len(), calibration.dof());
             for (slot, map) in maps.calibration.iter().enumerate() {

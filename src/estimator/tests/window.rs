@@ -101,7 +101,7 @@ fn projecting_landmarks_out_equals_their_schur_complement() {
         let active = estimator.active_tracks();
         let problem = estimator.problem(&active);
         let estimate = estimator.estimate(&active);
-        let rows = problem.visual_rows(&estimate);
+        let rows = problem.visual_rows(&estimate, &problem.linearization_point(&estimate));
         let total = problem.layout.total();
         let jacobian = rows.columns(0, total);
         let equations = problem.linearize(&estimate);
@@ -225,7 +225,10 @@ fn a_prior_contains_only_estimated_columns() {
             let problem = estimator.problem(&[]);
             let estimate = estimator.estimate(&[]);
             let total = problem.layout.total();
-            let rows = problem.prior.unwrap().rows(&problem.layout, &problem.first_estimate_offset(&estimate));
+            let rows = problem
+                .prior
+                .unwrap()
+                .rows(&problem.layout, &problem.point(&estimate, &estimate).first_estimate_offset());
             let residual = rows.column(total).into_owned();
             // Normalized columns, since units differ.
             let mut jacobian = rows.columns(0, total).into_owned();
@@ -251,7 +254,7 @@ fn the_classical_chain_keeps_its_null_directions_with_first_estimates() {
     let estimate = estimator.estimate(&active);
     let total = problem.layout.total();
     let parts = [
-        problem.visual_rows(&estimate),
+        problem.visual_rows(&estimate, &problem.linearization_point(&estimate)),
         problem.prior.unwrap().rows(&problem.layout, &DVector::zeros(total)),
         fixture::rows(&problem, &estimate, |label| matches!(label, FactorLabel::Imu(_))),
     ];

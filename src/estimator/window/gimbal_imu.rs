@@ -39,11 +39,10 @@ impl WindowState {
         navigation: &NavigationState,
     ) -> GimbalImuPrediction {
         let last = self.frames.newest();
-        let Some((own, rig)) = last.state.gimbal_imu.zip(setup.config.gimbal_imu.as_ref()) else {
+        let calibration = self.calibration.of(MAIN);
+        let Some((own, mount)) = last.state.gimbal_imu.zip(GimbalImuMount::new(calibration)) else {
             return GimbalImuPrediction::default();
         };
-        let calibration = self.calibration.of(MAIN);
-        let mount = GimbalImuMount::new(&rig.camera_from_imu, calibration);
         let motion = setup.gimbal_motion(input.gimbal_imu, own.bias, input.stamp_ns - last.stamp_ns);
         let predicted = motion.as_ref().zip(mount.state(&last.state, calibration));
         let Some(predicted) = predicted.map(|(motion, state)| motion.predict(&state, &setup.gravity_in_world)) else {

@@ -20,8 +20,8 @@ impl WindowState {
         let problem = self.problem(setup, &solved.cameras);
         let estimate = &solved.solution.estimate;
         let layout = problem.layout;
-        let frames = problem.linearization_frames(estimate);
-        let calibration = problem.linearization_calibration(&estimate.calibration);
+        let linearized = problem.linearization_point(estimate);
+        let (frames, calibration) = (&linearized.frames, &linearized.calibration);
         let numbers: Vec<FrameId> = self.frames.iter().map(|frame| FrameId(frame.index)).collect();
         let columns = layout.blocks(&self.calibration.parameters(), &numbers);
         let scales = scales_of(&columns);
@@ -31,7 +31,7 @@ impl WindowState {
         let mut kept = Vec::new();
         let total = layout.total();
         let mut rows = LabelledRows::new(total);
-        let point = problem.point(estimate, &frames);
+        let point = problem.point(estimate, &linearized);
         measurements(&point, layout.frames, &mut rows);
         problem.priors(&point, &mut rows);
         for (label, rows) in rows.by_factor() {
@@ -58,7 +58,7 @@ impl WindowState {
         };
         let clocks: Vec<ClockColumns> = (0..calibration.cameras())
             .map(|camera| {
-                let ((count, then), (_, now)) = (clocked(&calibration, camera), clocked(&estimate.calibration, camera));
+                let ((count, then), (_, now)) = (clocked(calibration, camera), clocked(&estimate.calibration, camera));
                 ClockColumns { count, shifts_s: [then, now] }
             })
             .collect();

@@ -106,7 +106,8 @@ impl Setup {
         if let Some(imu) = config.gimbal_imu.as_ref().filter(|_| config.estimate_gimbal_imu && camera == MAIN) {
             columns.extend(SensorColumn::gimbal_imu(imu.timeshift_s));
         }
-        calibration.with_sensors(columns).with_given_readout(sensor.readout_s)
+        let gimbal_imu = config.gimbal_imu.as_ref().filter(|_| camera == MAIN).map(|imu| imu.camera_from_imu);
+        calibration.with_sensors(columns).with_given_readout(sensor.readout_s).with_given_gimbal_imu(gimbal_imu)
     }
 
     /// True if some camera has a rolling shutter, so that camera poses depend on the motion after the stamp.

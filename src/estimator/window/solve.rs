@@ -130,7 +130,7 @@ fn is_outlier(residuals: &[Option<Vector2<f64>>], options: &EstimatorOptions) ->
 /// Reprojection residuals of all observations at an estimate, by camera.
 fn track_residuals(problem: &Problem<'_>, estimate: &Estimate) -> Vec<TrackResiduals> {
     let of_camera = |(camera, factors): (usize, &CameraFactors<'_>)| {
-        let view = problem.view(camera, &estimate.frames, &estimate.calibration);
+        let view = problem.view(camera, estimate);
         factors
             .tracks
             .iter()

@@ -62,7 +62,6 @@ impl WindowState {
             layout,
             cameras: (0..self.calibration.cameras()).map(factors).collect(),
             gravity_in_world: setup.gravity_in_world,
-            camera_from_gimbal_imu: setup.config.gimbal_imu.as_ref().map(|imu| imu.camera_from_imu),
             frames: &self.frames,
             prior: self.prior.as_ref(),
             start: self.start.as_ref(),

@@ -91,7 +91,8 @@ impl SensorWindow<'_> {
     /// Rows of one encoder reading per joint at the time of the frame, none without joints.
     fn encoder_rows(&self, state: &SensorState, slot: usize, sigma_rad: f64, sink: &mut impl Sink) {
         let calibration = state.calibration.of(MAIN);
-        let (angles_rad, rates_rad_per_s) = self.flight.joint_motion(self.times_s[slot] - calibration.encoder_shift_s());
+        let (angles_rad, rates_rad_per_s) =
+            self.flight.joint_motion(self.times_s[slot] - calibration.encoder_shift_s());
         let count = angles_rad.len();
         let reading = JointAngles {
             angles_rad,

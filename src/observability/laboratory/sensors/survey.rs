@@ -5,9 +5,9 @@ use std::fmt;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::LaboratoryForm;
 use super::experiments::{SECTIONS, SensorExperiment};
 use super::table::{SetRank, set_ranks};
-use super::LaboratoryForm;
 use crate::gimbal::{ParameterGroup, ParameterNames, Parameterization};
 use crate::observability::laboratory::SensorColumns;
 use crate::text::Named as _;

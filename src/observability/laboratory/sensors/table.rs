@@ -35,9 +35,8 @@ pub(crate) fn set_ranks(setup: &LaboratorySetup, form: LaboratoryForm, sets: &[S
     let chain = linearization.chain.dof();
     sets.iter()
         .map(|columns| {
-            let kept: Vec<usize> = (0..parameters.len())
-                .filter(|column| *column < chain || columns.has(parameters[*column]))
-                .collect();
+            let kept: Vec<usize> =
+                (0..parameters.len()).filter(|column| *column < chain || columns.has(parameters[*column])).collect();
             let selected = whole.select(&linearization, &kept);
             let svd = dense::thin_svd(&selected.block)?;
             let singular_values: Vec<f64> = svd.singular_values.iter().copied().collect();

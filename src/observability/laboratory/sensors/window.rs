@@ -351,10 +351,9 @@ fn given_calibration(setup: &LaboratorySetup, form: LaboratoryForm, wanted: Sens
     let columns = parameters.map(|parameter| SensorColumn { parameter, given: 0.0, sigma: parameter.scale() });
     let (translation_m, rotation_rad) = CHAIN_PRIOR;
     let sigmas = GivenSigmas { translation_m, rotation_rad };
-    let main =
-        Calibration::new(&setup.mechanism.chain, form.parameterization, sigmas, true, form.joint_offsets)
-            .with_sensors(columns.collect())
-            .with_given_readout(setup.readout_s);
+    let main = Calibration::new(&setup.mechanism.chain, form.parameterization, sigmas, true, form.joint_offsets)
+        .with_sensors(columns.collect())
+        .with_given_readout(setup.readout_s);
     let imu = wanted.imu_intrinsics && setup.poses != PoseKnowledge::Known;
     Calibrations::new(main, []).with_imu(imu.then(|| ImuCalibration::new(ImuIntrinsics::default())))
 }
