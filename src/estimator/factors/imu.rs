@@ -1,4 +1,4 @@
-//! IMU residual between two frames and its Jacobians.
+//! IMU factor between two frames: the term `‖r_B(z, X)‖²` of Eq. 8 with its Jacobians.
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
@@ -79,9 +79,15 @@ impl Factor for ImuFactor<'_> {
     }
 }
 
-/// Residual `[φ, p, v]` (9 × 1) of a motion increment against two states (IMU term of Eq. 8), not whitened.
+/// Residual `[φ, p, v]` (9 × 1) of a motion increment `(ΔR, Δp, Δv)` against the states i and j, T seconds apart: the
+/// IMU term of Eq. 8 (Forster et al., TRO 2017), not whitened.
 ///
-/// `duration_s` is the time between the states; gravity is in the frame of the poses, in m/s².
+/// ```text
+/// r_φ = Log(ΔRᵀ R_iᵀ R_j)    r_p = R_iᵀ (p_j − p_i − v_i T − ½ g T²) − Δp    r_v = R_iᵀ (v_j − v_i − g T) − Δv
+/// ```
+///
+/// Gravity g is in the frame of the poses, in m/s².
+#[expect(non_snake_case, reason = "letters of the formula")]
 pub fn motion_residual(
     motion: &MotionIncrement,
     duration_s: f64,
@@ -89,17 +95,23 @@ pub fn motion_residual(
     to: &NavigationState,
     gravity: &Vector3<f64>,
 ) -> Vector9 {
-    let back = from.world_from_imu.rotation.inverse();
-    let relative_rotation = back * to.world_from_imu.rotation;
-    let (shift, gain) = moved(duration_s, from, to, gravity);
-    let mut residual = Vector9::zeros();
-    residual.fixed_rows_mut::<3>(0).copy_from(&so3::log(&(motion.rotation.inverse() * relative_rotation)));
-    residual.fixed_rows_mut::<3>(3).copy_from(&(back * shift - motion.position_m));
-    residual.fixed_rows_mut::<3>(6).copy_from(&(back * gain - motion.velocity_m_per_s));
-    residual
+    let R_iT = from.world_from_imu.rotation.inverse();
+    let R_ij = R_iT * to.world_from_imu.rotation;
+    let (p_ij, v_ij) = displacement(duration_s, from, to, gravity);
+    let mut r = Vector9::zeros();
+    r.fixed_rows_mut::<3>(0).copy_from(&so3::log(&(motion.rotation.inverse() * R_ij)));
+    r.fixed_rows_mut::<3>(3).copy_from(&(R_iT * p_ij - motion.position_m));
+    r.fixed_rows_mut::<3>(6).copy_from(&(R_iT * v_ij - motion.velocity_m_per_s));
+    r
 }
 
 /// Derivatives of [`motion_residual`]; rotations are perturbed on the right.
+///
+/// ```text
+/// by φ_i: [−J_r⁻¹(r_φ) R_jᵀ R_i; [R_iᵀ p_ij]×; [R_iᵀ v_ij]×]    by p_i: [0; −R_iᵀ; 0]    by v_i: [0; −R_iᵀ T; −R_iᵀ]
+/// by φ_j: [J_r⁻¹(r_φ); 0; 0]                                  by p_j: [0; R_iᵀ; 0]     by v_j: [0; 0; R_iᵀ]
+/// by g: [0; −½ R_iᵀ T²; −R_iᵀ T]    by the increment: [−J_r⁻¹(r_φ) Exp(−r_φ); −I; −I]
+/// ```
 #[derive(Clone, Debug)]
 pub struct MotionJacobians {
     /// By `[φ, p, v]` of the earlier state (9 × 9).
@@ -112,6 +124,7 @@ pub struct MotionJacobians {
 }
 
 impl MotionJacobians {
+    #[expect(non_snake_case, reason = "letters of the formula")]
     pub fn new(
         motion: &MotionIncrement,
         duration_s: f64,
@@ -119,30 +132,29 @@ impl MotionJacobians {
         to: &NavigationState,
         gravity: &Vector3<f64>,
     ) -> Self {
-        let back_rotation = from.world_from_imu.rotation.inverse();
-        let back: Matrix3<f64> = back_rotation.to_rotation_matrix().into_inner();
-        let relative_rotation = back_rotation * to.world_from_imu.rotation;
-        let rotation_error = so3::log(&(motion.rotation.inverse() * relative_rotation));
-        let error_inverse = so3::right_jacobian_inverse(&rotation_error);
-        let relative_rotation_transpose: Matrix3<f64> = relative_rotation.inverse().to_rotation_matrix().into_inner();
-        let error_back: Matrix3<f64> = so3::exp(&-rotation_error).to_rotation_matrix().into_inner();
-        let (shift, gain) = moved(duration_s, from, to, gravity);
+        let R_ij = from.world_from_imu.rotation.inverse() * to.world_from_imu.rotation;
+        let R_iT: Matrix3<f64> = from.world_from_imu.rotation.inverse().to_rotation_matrix().into_inner();
+        let R_ijT: Matrix3<f64> = R_ij.inverse().to_rotation_matrix().into_inner();
+        let r_phi = so3::log(&(motion.rotation.inverse() * R_ij));
+        let J_inv = so3::right_jacobian_inverse(&r_phi);
+        let Exp_minus_r: Matrix3<f64> = so3::exp(&-r_phi).to_rotation_matrix().into_inner();
+        let (p_ij, v_ij) = displacement(duration_s, from, to, gravity);
 
         let mut by_from = Matrix9::zeros();
-        by_from.fixed_view_mut::<3, 3>(0, 0).copy_from(&-(error_inverse * relative_rotation_transpose));
-        by_from.fixed_view_mut::<3, 3>(3, 0).copy_from(&so3::hat(&(back * shift)));
-        by_from.fixed_view_mut::<3, 3>(3, 3).copy_from(&-back);
-        by_from.fixed_view_mut::<3, 3>(3, 6).copy_from(&(-back * duration_s));
-        by_from.fixed_view_mut::<3, 3>(6, 0).copy_from(&so3::hat(&(back * gain)));
-        by_from.fixed_view_mut::<3, 3>(6, 6).copy_from(&-back);
+        by_from.fixed_view_mut::<3, 3>(0, 0).copy_from(&-(J_inv * R_ijT));
+        by_from.fixed_view_mut::<3, 3>(3, 0).copy_from(&so3::hat(&(R_iT * p_ij)));
+        by_from.fixed_view_mut::<3, 3>(3, 3).copy_from(&-R_iT);
+        by_from.fixed_view_mut::<3, 3>(3, 6).copy_from(&(-R_iT * duration_s));
+        by_from.fixed_view_mut::<3, 3>(6, 0).copy_from(&so3::hat(&(R_iT * v_ij)));
+        by_from.fixed_view_mut::<3, 3>(6, 6).copy_from(&-R_iT);
         let mut by_to = Matrix9::zeros();
-        by_to.fixed_view_mut::<3, 3>(0, 0).copy_from(&error_inverse);
-        by_to.fixed_view_mut::<3, 3>(3, 3).copy_from(&back);
-        by_to.fixed_view_mut::<3, 3>(6, 6).copy_from(&back);
+        by_to.fixed_view_mut::<3, 3>(0, 0).copy_from(&J_inv);
+        by_to.fixed_view_mut::<3, 3>(3, 3).copy_from(&R_iT);
+        by_to.fixed_view_mut::<3, 3>(6, 6).copy_from(&R_iT);
         let mut by_gravity = SMatrix::<f64, 9, 3>::zeros();
-        by_gravity.fixed_view_mut::<3, 3>(3, 0).copy_from(&(back * (-0.5 * duration_s * duration_s)));
-        by_gravity.fixed_view_mut::<3, 3>(6, 0).copy_from(&(back * -duration_s));
-        Self { by_from, by_to, by_gravity, rotation_by_motion: -(error_inverse * error_back) }
+        by_gravity.fixed_view_mut::<3, 3>(3, 0).copy_from(&(R_iT * (-0.5 * duration_s * duration_s)));
+        by_gravity.fixed_view_mut::<3, 3>(6, 0).copy_from(&(R_iT * -duration_s));
+        Self { by_from, by_to, by_gravity, rotation_by_motion: -(J_inv * Exp_minus_r) }
     }
 
     /// Chain rule: derivative by `n` parameters of which the increment `[φ, p, v]` has the derivative `motion_by`
@@ -155,18 +167,23 @@ impl MotionJacobians {
     }
 }
 
-/// Displacement and change of velocity between two states without gravity and initial velocity, in the frame of the
-/// poses.
-fn moved(t: f64, from: &NavigationState, to: &NavigationState, gravity: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
-    let shift = to.world_from_imu.translation_m
+/// `p_ij = p_j − p_i − v_i T − ½ g T²` and `v_ij = v_j − v_i − g T`, in the frame of the poses.
+fn displacement(
+    t: f64,
+    from: &NavigationState,
+    to: &NavigationState,
+    gravity: &Vector3<f64>,
+) -> (Vector3<f64>, Vector3<f64>) {
+    let p_ij = to.world_from_imu.translation_m
         - from.world_from_imu.translation_m
         - from.velocity_m_per_s * t
         - gravity * (0.5 * t * t);
-    (shift, to.velocity_m_per_s - from.velocity_m_per_s - gravity * t)
+    (p_ij, to.velocity_m_per_s - from.velocity_m_per_s - gravity * t)
 }
 
-/// Residual `[φ, p, v, b_g, b_a]` (15 × 1) of two states given the IMU samples between them, not whitened; intrinsics
-/// of the IMU are `None` if they are not estimated.
+/// Residual `[φ, p, v, b_g, b_a]` (15 × 1) of two states given the IMU samples between them, not whitened:
+/// [`motion_residual`] with the increment corrected to the biases of the earlier state, and `b_j − b_i`. Intrinsics of
+/// the IMU are `None` if they are not estimated.
 pub(crate) fn residual(
     preintegration: &Preintegration,
     from: &NavigationState,

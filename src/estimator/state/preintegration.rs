@@ -1,8 +1,16 @@
 //! Preintegration of the IMU samples between two frames (Forster et al., TRO 2017) with covariance and bias
 //! Jacobians.
 //!
-//! Angular velocity and specific force are linear between samples: rotations use the second Magnus term,
-//! velocity and position Simpson's rule over each sample interval.
+//! Angular velocity ω and specific force a, without bias, are linear between two samples h seconds apart. The rotation
+//! over the interval has two terms of the Magnus expansion, velocity and position follow Simpson's rule:
+//!
+//! ```text
+//! ΔR ← ΔR Exp(φ)    Δp ← Δp + Δv h + ΔR δp    Δv ← Δv + ΔR δv
+//! φ = ½ (ω₀ + ω₁) h + ω₀ × ω₁ h²/12    δp = (a₀ + 2 E_½ a_½) h²/6    δv = (a₀ + 4 E_½ a_½ + E a₁) h/6
+//! ```
+//!
+//! with `E = Exp(φ)` and `E_½` over half of the interval. The covariance of the error `[φ, p, v, b_g, b_a]` and the
+//! Jacobian by the biases follow from the derivatives of these: `P ← A P Aᵀ + Q`, `J ← A J`.
 //! Error vectors are ordered `[φ, p, v, b_g, b_a]` (15), with the perturbation rule of [`crate::geometry`].
 
 use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
@@ -241,7 +249,7 @@ impl Preintegration {
         self.shifted(&self.shift(bias, None))
     }
 
-    /// Change of `[φ, p, v]` (9 × 1) due to a change of bias and intrinsics, to first order.
+    /// Change `J δb` of `[φ, p, v]` (9 × 1) due to a change δb of bias and intrinsics, to first order.
     pub(crate) fn shift(&self, bias: &ImuBias, errors: Option<&ImuErrors>) -> SVector<f64, 9> {
         let shift: SVector<f64, 9> = self.bias_jacobian * self.bias_change(bias);
         match self.intrinsics_change(errors) {
@@ -250,7 +258,7 @@ impl Preintegration {
         }
     }
 
-    /// Increment changed by `[φ, p, v]`.
+    /// Increment changed by `[φ, p, v]`: `(ΔR Exp(φ), Δp + p, Δv + v)`.
     pub(crate) fn shifted(&self, shift: &SVector<f64, 9>) -> MotionIncrement {
         MotionIncrement {
             rotation: self.increment.rotation * so3::exp(&shift.fixed_rows::<3>(0).into_owned()),
@@ -267,7 +275,11 @@ impl Preintegration {
         change
     }
 
-    /// Predicts the state at the end of the interval from the one at its start.
+    /// Predicts the state at the end of the interval from the one at its start, T seconds earlier:
+    ///
+    /// ```text
+    /// R_j = R_i ΔR    p_j = p_i + v_i T + ½ g T² + R_i Δp    v_j = v_i + g T + R_i Δv
+    /// ```
     pub fn predict(&self, start: &NavigationState, gravity_in_world: &Vector3<f64>) -> NavigationState {
         let motion = self.corrected(&start.bias);
         let t = self.duration_s;
@@ -292,148 +304,90 @@ impl Preintegration {
     }
 
     fn propagate(&mut self, from: &ImuSample, to: &ImuSample) {
-        let h = seconds_from_ns(to.stamp_ns - from.stamp_ns);
+        let [gyroscope_noise, force_noise] = self.squared_densities(from, to);
+        let corrected = |sample: &ImuSample| match &self.intrinsics {
+            Some(intrinsics) => imu_errors::corrected(&intrinsics.errors, sample),
+            None => *sample,
+        };
+        let ends = [corrected(from), corrected(to)];
+        let rates = ends.map(|sample| sample.angular_velocity_rad_per_s - self.bias.gyroscope_rad_per_s);
+        let forces = ends.map(|sample| sample.specific_force_m_per_s2 - self.bias.accelerometer_m_per_s2);
+        let interval_s = seconds_from_ns(to.stamp_ns - from.stamp_ns);
+        let step = SampleStep::new(interval_s, rates, forces, &self.increment.rotation);
+        self.propagate_bias_jacobian(&step);
+        self.propagate_intrinsics_jacobian(&step, [from, to]);
+        let transition = step.transition();
+        self.covariance = transition * self.covariance * transition.transpose();
+        self.add_noise(&step, &gyroscope_noise, &force_noise);
+        self.increment.position_m += self.increment.velocity_m_per_s * step.h + step.r * step.dp;
+        self.increment.velocity_m_per_s += step.r * step.dv;
+        self.increment.rotation = so3::composed(&self.increment.rotation, &step.rotation);
+        self.duration_s += step.h;
+    }
+
+    /// Squared noise densities by axis of gyroscope and accelerometer over an interval; counts saturated samples.
+    fn squared_densities(&mut self, from: &ImuSample, to: &ImuSample) -> [Vector3<f64>; 2] {
         self.repeats.count(from, to);
-        let (gyroscope_noise, gyroscope_saturated) = Repeats::densities(
+        let (gyroscope, gyroscope_saturated) = Repeats::densities(
             &self.repeats.gyroscope,
             &to.angular_velocity_rad_per_s,
             MIN_SATURATED_RAD_PER_S,
             self.noise.gyroscope_noise_density,
         );
-        let (force_noise, force_saturated) = Repeats::densities(
+        let (accelerometer, accelerometer_saturated) = Repeats::densities(
             &self.repeats.accelerometer,
             &to.specific_force_m_per_s2,
             MIN_SATURATED_M_PER_S2,
             self.noise.accelerometer_noise_density,
         );
-        self.saturated += usize::from(gyroscope_saturated || force_saturated);
-        let corrected = self
-            .intrinsics
-            .as_ref()
-            .map(|it| (imu_errors::corrected(&it.errors, from), imu_errors::corrected(&it.errors, to)));
-        let (from_corrected, to_corrected) = corrected.as_ref().map_or((from, to), |(from, to)| (from, to));
-        let w0 = from_corrected.angular_velocity_rad_per_s - self.bias.gyroscope_rad_per_s;
-        let w1 = to_corrected.angular_velocity_rad_per_s - self.bias.gyroscope_rad_per_s;
-        let a0 = from_corrected.specific_force_m_per_s2 - self.bias.accelerometer_m_per_s2;
-        let a1 = to_corrected.specific_force_m_per_s2 - self.bias.accelerometer_m_per_s2;
-        let a_half = (a0 + a1) * 0.5;
-
-        // Rotations over the first half and the whole interval.
-        let w_half = (w0 + w1) * 0.5;
-        let phi_half = so3::of_linear_rate(&w0, &w_half, 0.5 * h);
-        let phi = so3::of_linear_rate(&w0, &w1, h);
-        let half_rotation = so3::exp(&phi_half);
-        let step_rotation = so3::exp(&phi);
-
-        // Simpson's rule, in the frame at `from`.
-        let force_half = half_rotation * a_half;
-        let force_end = step_rotation * a1;
-        let dv = (a0 + force_half * 4.0 + force_end) * (h / 6.0);
-        let dp = (a0 + force_half * 2.0) * (h * h / 6.0);
-
-        let r = self.increment.rotation.to_rotation_matrix().into_inner();
-        let e_half: Matrix3<f64> = half_rotation.to_rotation_matrix().into_inner();
-        let e: Matrix3<f64> = step_rotation.to_rotation_matrix().into_inner();
-        // Derivatives of the step with respect to a constant change of angular velocity and specific force.
-        let phi_by_w = so3::right_jacobian(&phi) * (Matrix3::identity() * h - so3::hat(&(w1 - w0)) * (h * h / 12.0));
-        let phi_half_by_w = so3::right_jacobian(&phi_half)
-            * (Matrix3::identity() * (0.5 * h) - so3::hat(&(w_half - w0)) * (h * h / 48.0));
-        let half_by_w = -(e_half * so3::hat(&a_half) * phi_half_by_w);
-        let end_by_angular_rate = -(e * so3::hat(&a1) * phi_by_w);
-        let dv_by_w = r * (half_by_w * 4.0 + end_by_angular_rate) * (h / 6.0);
-        let dp_by_w = r * half_by_w * (h * h / 3.0);
-        let dv_by_a = r * (Matrix3::identity() + e_half * 4.0 + e) * (h / 6.0);
-        let dp_by_a = r * (Matrix3::identity() + e_half * 2.0) * (h * h / 6.0);
-        let step_rotation_transpose = e.transpose();
-        let dv_by_phi = -(r * so3::hat(&dv));
-        let dp_by_phi = -(r * so3::hat(&dp));
-
-        self.propagate_bias_jacobian(
-            h,
-            &step_rotation_transpose,
-            [&dp_by_phi, &dv_by_phi],
-            [&phi_by_w, &dp_by_w, &dv_by_w],
-            [&dp_by_a, &dv_by_a],
-        );
-
-        if let Some(intrinsics) = &mut self.intrinsics {
-            // The intrinsics change both ends by nearly the same: use the mean over the whole interval.
-            let [first, second] = [from, to].map(|sample| imu_errors::derivatives(&intrinsics.errors, sample));
-            let (rates, forces) = ((first.0 + second.0) * 0.5, (first.1 + second.1) * 0.5);
-            let j = &mut intrinsics.jacobian;
-            let phi: SMatrix<f64, 3, 15> = j.fixed_rows::<3>(0).into_owned();
-            let velocity: SMatrix<f64, 3, 15> = j.fixed_rows::<3>(6).into_owned();
-            let mut position = j.fixed_rows_mut::<3>(3);
-            position += velocity * h + dp_by_phi * phi + dp_by_w * rates + dp_by_a * forces;
-            let mut velocity = j.fixed_rows_mut::<3>(6);
-            velocity += dv_by_phi * phi + dv_by_w * rates + dv_by_a * forces;
-            j.fixed_rows_mut::<3>(0).copy_from(&(step_rotation_transpose * phi + phi_by_w * rates));
-        }
-
-        let mut transition = Matrix15::identity();
-        transition.fixed_view_mut::<3, 3>(0, 0).copy_from(&step_rotation_transpose);
-        transition.fixed_view_mut::<3, 3>(0, 9).copy_from(&-phi_by_w);
-        transition.fixed_view_mut::<3, 3>(3, 0).copy_from(&dp_by_phi);
-        transition.fixed_view_mut::<3, 3>(3, 6).copy_from(&(Matrix3::identity() * h));
-        transition.fixed_view_mut::<3, 3>(3, 9).copy_from(&-dp_by_w);
-        transition.fixed_view_mut::<3, 3>(3, 12).copy_from(&-dp_by_a);
-        transition.fixed_view_mut::<3, 3>(6, 0).copy_from(&dv_by_phi);
-        transition.fixed_view_mut::<3, 3>(6, 9).copy_from(&-dv_by_w);
-        transition.fixed_view_mut::<3, 3>(6, 12).copy_from(&-dv_by_a);
-        self.covariance = transition * self.covariance * transition.transpose();
-        self.add_noise(
-            h,
-            [&phi_by_w, &dp_by_w, &dv_by_w],
-            &gyroscope_noise,
-            &(r * Matrix3::from_diagonal(&force_noise) * r.transpose()),
-        );
-
-        self.increment.position_m += self.increment.velocity_m_per_s * h + r * dp;
-        self.increment.velocity_m_per_s += r * dv;
-        self.increment.rotation = so3::composed(&self.increment.rotation, &step_rotation);
-        self.duration_s += h;
+        self.saturated += usize::from(gyroscope_saturated || accelerometer_saturated);
+        [gyroscope, accelerometer]
     }
 
-    fn propagate_bias_jacobian(
-        &mut self,
-        h: f64,
-        step_rotation_transpose: &Matrix3<f64>,
-        [dp_by_phi, dv_by_phi]: [&Matrix3<f64>; 2],
-        [phi_by_w, dp_by_w, dv_by_w]: [&Matrix3<f64>; 3],
-        [dp_by_a, dv_by_a]: [&Matrix3<f64>; 2],
-    ) {
+    fn propagate_bias_jacobian(&mut self, step: &SampleStep) {
         let j = &mut self.bias_jacobian;
         let phi_by_bg: Matrix3<f64> = j.fixed_view::<3, 3>(0, 0).into_owned();
         let v_by_bg: Matrix3<f64> = j.fixed_view::<3, 3>(6, 0).into_owned();
         let v_by_ba: Matrix3<f64> = j.fixed_view::<3, 3>(6, 3).into_owned();
         let mut p_by_bg = j.fixed_view_mut::<3, 3>(3, 0);
-        p_by_bg += v_by_bg * h + dp_by_phi * phi_by_bg - dp_by_w;
+        p_by_bg += v_by_bg * step.h + step.dp_by_phi * phi_by_bg - step.dp_by_w;
         let mut p_by_ba = j.fixed_view_mut::<3, 3>(3, 3);
-        p_by_ba += v_by_ba * h - dp_by_a;
+        p_by_ba += v_by_ba * step.h - step.dp_by_a;
         let mut v_by_bg = j.fixed_view_mut::<3, 3>(6, 0);
-        v_by_bg += dv_by_phi * phi_by_bg - dv_by_w;
+        v_by_bg += step.dv_by_phi * phi_by_bg - step.dv_by_w;
         let mut v_by_ba = j.fixed_view_mut::<3, 3>(6, 3);
-        v_by_ba -= dv_by_a;
-        j.fixed_view_mut::<3, 3>(0, 0).copy_from(&(step_rotation_transpose * phi_by_bg - phi_by_w));
+        v_by_ba -= step.dv_by_a;
+        j.fixed_view_mut::<3, 3>(0, 0).copy_from(&(step.e_transpose * phi_by_bg - step.phi_by_w));
     }
 
-    /// Adds white noise and random walk of one sample interval (15 × 15), from the squared continuous densities: of the
-    /// angular velocity by axis, of the specific force as a matrix in the frame at the interval's start.
-    fn add_noise(
-        &mut self,
-        h: f64,
-        [phi_by_w, dp_by_w, dv_by_w]: [&Matrix3<f64>; 3],
-        gyroscope_noise: &Vector3<f64>,
-        force_noise: &Matrix3<f64>,
-    ) {
+    /// The intrinsics change both ends by nearly the same: the mean over the whole interval is used.
+    fn propagate_intrinsics_jacobian(&mut self, step: &SampleStep, ends: [&ImuSample; 2]) {
+        let Some(intrinsics) = &mut self.intrinsics else { return };
+        let [first, second] = ends.map(|sample| imu_errors::derivatives(&intrinsics.errors, sample));
+        let (rates, forces) = ((first.0 + second.0) * 0.5, (first.1 + second.1) * 0.5);
+        let j = &mut intrinsics.jacobian;
+        let phi: SMatrix<f64, 3, 15> = j.fixed_rows::<3>(0).into_owned();
+        let velocity: SMatrix<f64, 3, 15> = j.fixed_rows::<3>(6).into_owned();
+        let mut position = j.fixed_rows_mut::<3>(3);
+        position += velocity * step.h + step.dp_by_phi * phi + step.dp_by_w * rates + step.dp_by_a * forces;
+        let mut velocity = j.fixed_rows_mut::<3>(6);
+        velocity += step.dv_by_phi * phi + step.dv_by_w * rates + step.dv_by_a * forces;
+        j.fixed_rows_mut::<3>(0).copy_from(&(step.e_transpose * phi + step.phi_by_w * rates));
+    }
+
+    /// Adds white noise and random walk of one sample interval (15 × 15), from the squared continuous densities of
+    /// angular velocity and specific force by axis.
+    fn add_noise(&mut self, step: &SampleStep, gyroscope_noise: &Vector3<f64>, force_noise: &Vector3<f64>) {
+        let h = step.h;
         let square = |density: f64| density * density;
         let mut by_angular_rate = SMatrix::<f64, 9, 3>::zeros();
-        by_angular_rate.fixed_view_mut::<3, 3>(0, 0).copy_from(phi_by_w);
-        by_angular_rate.fixed_view_mut::<3, 3>(3, 0).copy_from(dp_by_w);
-        by_angular_rate.fixed_view_mut::<3, 3>(6, 0).copy_from(dv_by_w);
+        by_angular_rate.fixed_view_mut::<3, 3>(0, 0).copy_from(&step.phi_by_w);
+        by_angular_rate.fixed_view_mut::<3, 3>(3, 0).copy_from(&step.dp_by_w);
+        by_angular_rate.fixed_view_mut::<3, 3>(6, 0).copy_from(&step.dv_by_w);
         let mut motion = self.covariance.fixed_view_mut::<9, 9>(0, 0);
         motion += by_angular_rate * Matrix3::from_diagonal(gyroscope_noise) * by_angular_rate.transpose() / h;
         // White noise of the specific force correlates velocity and position over the interval.
+        let force_noise = step.r * Matrix3::from_diagonal(force_noise) * step.r.transpose();
         for (row, column, factor) in [(3, 3, h * h * h / 3.0), (3, 6, h * h / 2.0), (6, 3, h * h / 2.0), (6, 6, h)] {
             let mut block = self.covariance.fixed_view_mut::<3, 3>(row, column);
             block += force_noise * factor;
@@ -442,5 +396,84 @@ impl Preintegration {
             self.covariance[(9 + axis, 9 + axis)] += square(self.noise.gyroscope_random_walk) * h;
             self.covariance[(12 + axis, 12 + axis)] += square(self.noise.accelerometer_random_walk) * h;
         }
+    }
+}
+
+/// Motion over one sample interval in the frame at its start, with derivatives in the frame of the increment: by a
+/// constant change of ω and of a over the interval, and by the rotation φ of the increment before it.
+struct SampleStep {
+    h: f64,
+    /// `E = Exp(φ)`.
+    rotation: UnitQuaternion<f64>,
+    e_transpose: Matrix3<f64>,
+    /// `ΔR` before the interval.
+    r: Matrix3<f64>,
+    dp: Vector3<f64>,
+    dv: Vector3<f64>,
+    phi_by_w: Matrix3<f64>,
+    dp_by_w: Matrix3<f64>,
+    dv_by_w: Matrix3<f64>,
+    dp_by_a: Matrix3<f64>,
+    dv_by_a: Matrix3<f64>,
+    dp_by_phi: Matrix3<f64>,
+    dv_by_phi: Matrix3<f64>,
+}
+
+impl SampleStep {
+    /// Step over h seconds between rates and forces without bias, after the rotation ΔR.
+    fn new(
+        h: f64,
+        [w0, w1]: [Vector3<f64>; 2],
+        [a0, a1]: [Vector3<f64>; 2],
+        rotation_before: &UnitQuaternion<f64>,
+    ) -> Self {
+        let (w_half, a_half) = ((w0 + w1) * 0.5, (a0 + a1) * 0.5);
+        let phi_half = so3::of_linear_rate(&w0, &w_half, 0.5 * h);
+        let phi = so3::of_linear_rate(&w0, &w1, h);
+        let (half_rotation, rotation) = (so3::exp(&phi_half), so3::exp(&phi));
+        let force_half = half_rotation * a_half;
+        let dv = (a0 + force_half * 4.0 + rotation * a1) * (h / 6.0);
+        let dp = (a0 + force_half * 2.0) * (h * h / 6.0);
+
+        let r = rotation_before.to_rotation_matrix().into_inner();
+        let e_half: Matrix3<f64> = half_rotation.to_rotation_matrix().into_inner();
+        let e: Matrix3<f64> = rotation.to_rotation_matrix().into_inner();
+        let identity = Matrix3::identity();
+        let phi_by_w = so3::right_jacobian(&phi) * (identity * h - so3::hat(&(w1 - w0)) * (h * h / 12.0));
+        let phi_half_by_w =
+            so3::right_jacobian(&phi_half) * (identity * (0.5 * h) - so3::hat(&(w_half - w0)) * (h * h / 48.0));
+        // Derivatives of `E_½ a_½` and of `E a₁`.
+        let half_by_w = -(e_half * so3::hat(&a_half) * phi_half_by_w);
+        let end_by_w = -(e * so3::hat(&a1) * phi_by_w);
+        Self {
+            h,
+            rotation,
+            e_transpose: e.transpose(),
+            r,
+            dp,
+            dv,
+            phi_by_w,
+            dp_by_w: r * half_by_w * (h * h / 3.0),
+            dv_by_w: r * (half_by_w * 4.0 + end_by_w) * (h / 6.0),
+            dp_by_a: r * (identity + e_half * 2.0) * (h * h / 6.0),
+            dv_by_a: r * (identity + e_half * 4.0 + e) * (h / 6.0),
+            dp_by_phi: -(r * so3::hat(&dp)),
+            dv_by_phi: -(r * so3::hat(&dv)),
+        }
+    }
+
+    /// Transition A (15 × 15) of the error `[φ, p, v, b_g, b_a]`; a bias acts as a negative change of ω or a.
+    fn transition(&self) -> Matrix15 {
+        let mut transition = Matrix15::identity();
+        transition.fixed_view_mut::<3, 3>(0, 0).copy_from(&self.e_transpose);
+        transition.fixed_view_mut::<3, 3>(0, 9).copy_from(&-self.phi_by_w);
+        transition.fixed_view_mut::<3, 3>(3, 0).copy_from(&self.dp_by_phi);
+        transition.fixed_view_mut::<3, 3>(3, 6).copy_from(&(Matrix3::identity() * self.h));
+        transition.fixed_view_mut::<3, 3>(3, 9).copy_from(&-self.dp_by_w);
+        transition.fixed_view_mut::<3, 3>(3, 12).copy_from(&-self.dp_by_a);
+        transition.fixed_view_mut::<3, 3>(6, 0).copy_from(&self.dv_by_phi);
+        transition.fixed_view_mut::<3, 3>(6, 9).copy_from(&-self.dv_by_w);
+        transition.fixed_view_mut::<3, 3>(6, 12).copy_from(&-self.dv_by_a);
+        transition
     }
 }
