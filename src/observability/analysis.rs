@@ -39,6 +39,13 @@ impl ScalingRule {
 /// Returns the ranks of a step's calibration, columns in units of 10° and 3 cm; `None` when the linearization
 /// is not finite.
 ///
+/// With the calibration columns `J_c` of the whitened rows, their scales D, and N whose rows span the complement of all
+/// other columns, the ranks are those of `N J_c D` with the singular values s (docs/mathematics.md, section 8):
+///
+/// ```text
+/// structural: s > 100 ε max(rows, columns) ‖J_c D‖    informed: s ≥ 1
+/// ```
+///
 /// `chain` is the chain of the linearization's columns and `joint_angles_rad` the joint angles of each frame.
 /// `joints_free` means that the angles are unknowns without encoder readings or a prior.
 pub fn analyse<A: AsRef<[f64]>>(

@@ -20,6 +20,13 @@ pub(super) struct Deficits {
 
 /// Splits the deficit `columns − rank` by cause, as differences of ranks of the chain's Jacobians; the columns
 /// `kept` are unknown.
+///
+/// With J of `T_IC` by the parameters, stacked over generic joint angles or over the angles θ of the window, and J without
+/// its part in the columns `J_θ` of the joint angles (docs/mathematics.md, section 8):
+///
+/// ```text
+/// G = n − rank J    F = n − rank J(θ) − G    E = n − rank J(θ)⊥ − G − F    M: the rest
+/// ```
 pub(super) fn classify(
     chain: &Chain,
     kept: &[usize],

@@ -1,4 +1,4 @@
-//! The rig's prior on the calibration.
+//! Prior on the calibration Φ of Eq. 7: `r = W (Φ ⊟ Φ₀)` with `WᵀW` the inverse of its covariance.
 
 use super::factor::{Factor, JacobianBlock, Point, Sink, WhitenedRows};
 use super::kind::FactorLabel;

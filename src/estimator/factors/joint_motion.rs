@@ -1,4 +1,4 @@
-//! Joint rates and joint accelerations of a frame.
+//! Joint rates and joint accelerations of a frame: `r = (q − z) / σ` for each of `q = [θ̇; θ̈]`.
 
 use super::encoder::diagonal;
 use super::factor::{Factor, JacobianBlock, Point, Sink, WhitenedRows};

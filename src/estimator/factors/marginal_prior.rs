@@ -1,4 +1,13 @@
-//! Marginalization prior in square-root form around fixed linearization points.
+//! Marginalization prior in square-root form around fixed linearization points: the term `‖r_p − H_p X‖²` of Eq. 8.
+//!
+//! Rows `[J_m J_k | r]` by eliminated and by kept columns are transformed orthogonally, so that no normal equations are
+//! formed (Demmel et al., Square Root Marginalization for Sliding-Window Bundle Adjustment, ICCV 2021):
+//!
+//! ```text
+//! Qᵀ [J_m J_k | r] = [R_m * | *; 0 J | r_p]
+//! ```
+//!
+//! The rows below `R_m` are the prior; it equals that of the Schur complement `H_kk − H_km H_mm⁻¹ H_mk`.
 
 use std::ops::Range;
 

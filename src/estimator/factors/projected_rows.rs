@@ -1,5 +1,8 @@
 //! Reprojection factors as rows over the blocks of a camera (its poses and intrinsics), with every landmark eliminated
 //! by orthogonal projection: without normal equations, unobservable directions stay exactly unobservable.
+//!
+//! With the derivatives `J_l` by a landmark and `J_c` by the blocks, the rows are `N (J_c δ + r)` where the rows of N span
+//! the complement of `J_l`, `N J_l = 0` (Mourikis and Roumeliotis, ICRA 2007; Demmel et al., CVPR 2021).
 
 use nalgebra::{DMatrix, DVector};
 

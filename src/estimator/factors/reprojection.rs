@@ -1,4 +1,11 @@
 //! Reprojection factors of one camera in a window: cost and normal equations over its poses.
+//!
+//! ```text
+//! r_C = Ψ(R_CjCi b + λ t_CjCi) − z    T_CjCi = (T_WIj T_IjCj)⁻¹ T_WIi T_IiCi    (Eqs. 9, 10)
+//! ```
+//!
+//! with the landmark's bearing b and inverse distance λ in the anchor's camera i and its pixel z in camera j; the sign of
+//! the residual is the opposite of that in Eq. 9.
 
 use nalgebra::Vector2;
 

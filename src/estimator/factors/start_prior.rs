@@ -1,4 +1,9 @@
-//! The prior at the start of the window.
+//! The prior at the start of the window, in place of the marginalization prior of Eq. 8.
+//!
+//! ```text
+//! r = [e_zᵀ Log(R R₀ᵀ) / σ_ψ; (p − p₀) / σ_p; (b_g − b_g0) / σ_bg; (b_a − b_a0) / σ_ba]
+//! ∂r_ψ/∂φ = (Rᵀ e_z)ᵀ / σ_ψ
+//! ```
 
 use nalgebra::{SMatrix, SVector, Vector3};
 

@@ -227,6 +227,14 @@ fn align_from(
 }
 
 /// Weighted normal equations `N x = b` of all intervals and priors, and the weighted sum of the squared right sides.
+///
+/// With `(R_k, p_k, v_k)` of the IMU, `p_k = s R_IC c_k + l_0 − R_k l_k` from the camera's position `c_k` and lever arm
+/// `l_k`, an interval of T seconds gives six equations, linear in scale s, `v_k`, gravity g and a change of the bias `b_a`
+/// and of `R_IC`, as the visual–inertial alignment of Qin et al. (VINS-Mono, TRO 2018):
+///
+/// ```text
+/// p_k+1 − p_k = v_k T + ½ g T² + R_k Δp    v_k+1 − v_k = g T + R_k Δv
+/// ```
 fn linear_system(
     input: &AlignmentInput<'_>,
     rotations: &[UnitQuaternion<f64>],
@@ -306,8 +314,9 @@ fn add_rows(
 
 /// Least-squares solution of `N x = b` whose three gravity entries have exactly the given norm.
 ///
-/// All other unknowns are eliminated onto gravity. The multiplier of the constraint is the root of a function
-/// that decreases monotonically beyond the last pole, found by bisection.
+/// All other unknowns are eliminated onto gravity, `A g = b` with the Schur complement A. The multiplier μ of the
+/// constraint, with `(A + μ I) g = b`, is the root of a function that decreases monotonically beyond
+/// the last pole, found by bisection.
 pub(super) fn solve_with_gravity_norm(
     normal: &DMatrix<f64>,
     rhs: &DVector<f64>,

@@ -14,7 +14,8 @@ pub struct BearingRotation {
 }
 
 /// Rotation `camera_j_from_camera_i` that best maps the first bearings of the pairs onto the second ones, by robust
-/// least squares from an initial value.
+/// least squares from an initial value: minimizes `Σ w |R b_i − b_j|²` with Cauchy's weights w, whose normal equations
+/// for a step φ are `Σ w (I − b_i b_iᵀ) φ = Σ w b_i × Rᵀ b_j`.
 ///
 /// Parallax of near points biases a plain least-squares fit, so angles beyond the median get less weight (iteratively
 /// reweighted). Returns `None` with fewer than three pairs.
@@ -117,8 +118,8 @@ pub fn refine_camera_pose(
     Some(ResectedPose { world_from_camera: pose, inliers, rms_rad: (sum / count.max(1) as f64).sqrt() })
 }
 
-/// Angle error of a known point in the bearing's tangent plane (2 × 1) and its derivative by the camera pose `[φ; δt]`
-/// (2 × 6); `None` when the point lies behind the camera.
+/// Angle error `Bᵀ Rᵀ (x − t) / |x − t|` of a known point x in the tangent plane B of its bearing (2 × 1) and its
+/// derivative by the camera pose `[φ; δt]` (2 × 6); `None` when the point lies behind the camera.
 fn pose_residual(
     world_from_camera: &RigidTransform,
     point: &Vector3<f64>,

@@ -1,4 +1,5 @@
-//! Joint least-squares refinement of images and IMU samples: poses, velocities, biases, gravity, extrinsics.
+//! Joint least-squares refinement of images and IMU samples: poses, velocities, biases, gravity, extrinsics. The cost is
+//! Eq. 8 with priors on extrinsics and biases in place of the marginalization prior.
 //!
 //! The IMU frame of the first view is the frame of reference, so there is no gauge freedom; gravity is a direction in
 //! it with known magnitude. The extrinsics are the given ones with an error common to all views (a rotation on the

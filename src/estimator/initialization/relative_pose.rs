@@ -1,4 +1,7 @@
-//! Relative pose of two views from bearing pairs: five-point hypotheses, rotation prior, robust refinement.
+//! Relative pose of two views from bearing pairs: five-point hypotheses (RANSAC, Fischler and Bolles 1981), rotation
+//! prior, robust refinement of the distances to the epipolar constraint `b_jᵀ E b_i = 0`, `E = [t]× R`.
+//!
+//! With a ratio w of inliers, `ln(1 − p) / ln(1 − w⁵)` samples contain one without outliers with probability p.
 
 use nalgebra::{Const, Matrix3, UnitQuaternion, Vector3, Vector5};
 
@@ -162,7 +165,8 @@ fn essential_of(camera_j_from_camera_i: &RigidTransform) -> Matrix3<f64> {
     so3::hat(&camera_j_from_camera_i.translation_m) * camera_j_from_camera_i.rotation_matrix()
 }
 
-/// Distance of a pair from the epipolar constraint, to first order, in radians.
+/// Distance of a pair from the epipolar constraint, to first order (Sampson): `|b_jᵀ E b_i| / √(|E b_i|² + |Eᵀ b_j|²)`, in
+/// radians.
 fn epipolar_angle(essential: &Matrix3<f64>, (bearing_i, bearing_j): &BearingPair) -> f64 {
     let line_j = essential * bearing_i;
     let line_i = essential.tr_mul(bearing_j);

@@ -12,7 +12,7 @@ use crate::estimator::factors::reprojection::VisualModel;
 use crate::estimator::state::calibration::Calibration;
 use crate::estimator::state::calibrations::Calibrations;
 use crate::estimator::state::camera_pose;
-use crate::estimator::state::columns::FrameId;
+use crate::estimator::state::columns::{ColumnBlock, ColumnGroup, FrameId};
 use crate::estimator::state::estimate::Estimate;
 use crate::estimator::state::frame::{Frame, layout};
 use crate::estimator::state::frame_state::{FrameState, Rates};
@@ -204,5 +204,32 @@ impl HypotheticalWindow {
             }
         }
         (tracks, landmarks)
+    }
+}
+
+impl Linearization {
+    /// This linearization without the columns of known quantities.
+    pub(crate) fn without_known(&self, poses: &PoseKnowledge, joints: &JointKnowledge) -> Self {
+        let count = |group: ColumnGroup| match (group, poses, joints) {
+            (ColumnGroup::Joints, _, JointKnowledge::Known)
+            | (ColumnGroup::Pose | ColumnGroup::VelocityBias, PoseKnowledge::Known, _) => 0,
+            // Keeps the velocity; the biases follow it in the block.
+            (ColumnGroup::VelocityBias, PoseKnowledge::Imu { biases_known: true, .. }, _) => 3,
+            _ => usize::MAX,
+        };
+        let (mut kept, mut columns) = (Vec::new(), Vec::new());
+        for block in &self.columns {
+            let len = block.len.min(count(block.id.group()));
+            if len > 0 {
+                columns.push(ColumnBlock { start: kept.len(), len, ..*block });
+                kept.extend(block.start..block.start + len);
+            }
+        }
+        Self {
+            columns,
+            jacobian: self.jacobian.select_columns(&kept),
+            prior_jacobian: self.prior_jacobian.select_columns(&kept),
+            ..self.clone()
+        }
     }
 }

@@ -2,7 +2,8 @@
 //!
 //! The marginal information of the calibration in the window is compared with that of the same window without
 //! the factors of the newest image: its observations, IMU interval, encoder readings and zero-velocity update.
-//! They add `G = JcᵀU·UᵀJc`, where `U` is an orthonormal basis of the new rows orthogonal to all states.
+//! With the covariances P and P' of a parameter with and without them the gain is `½ log₂(P'/P)` bits. They add
+//! `G = JcᵀU·UᵀJc`, where `U` is an orthonormal basis of the new rows orthogonal to all states.
 //! Up to a rigid motion of the scene, the calibration columns of the observations are zero without motion in
 //! the window. With motion they are a sum over motions ([`crate::estimator::problem::motion_parts`]), and so is `G`: each motion
 //! contributes the symmetric `½(JmᵀU·UᵀJc + JcᵀU·UᵀJm)`, which is also its Shapley value. The remainder comes

@@ -2,7 +2,6 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::hypothetical::{JointKnowledge, PoseKnowledge};
 use super::information_gain::CameraInformation;
 use super::problem::Problem;
 use crate::estimator::factors::kind::{FactorKind, FactorLabel};
@@ -11,14 +10,15 @@ use crate::estimator::factors::measurements::measurements;
 use crate::estimator::factors::projected_rows::NewestRows;
 use crate::estimator::state::calibrations::MAIN;
 use crate::estimator::state::camera_pose::CameraMaps;
-use crate::estimator::state::columns::{ColumnBlock, ColumnGroup, FrameId};
+use crate::estimator::state::columns::{ColumnBlock, FrameId};
 use crate::estimator::state::estimate::Estimate;
 use crate::gimbal::{Chain, ParameterId};
 
 /// Whitened linearization of the step at its final estimate, without the priors on the calibration.
 ///
-/// The inverse depths are already eliminated by orthogonal projection (each feature's rows are rotated and their first
-/// row is dropped), so that the rows stay whitened residuals and no normal equations are formed.
+/// The rows are `J` of `½‖r + J (x ⊟ x₀)‖²`, Eq. 8 at x₀. The inverse depths are already eliminated by orthogonal
+/// projection (each feature's rows are rotated and their first row is dropped), so that the rows stay whitened residuals
+/// and no normal equations are formed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Linearization {
     /// Column blocks in order: calibration, joints, poses, velocities and biases, the IMU on the gimbal.
@@ -36,33 +36,6 @@ pub struct Linearization {
     /// Chain at which the calibration columns were evaluated (the first estimate, not the current one, where there is
     /// one).
     pub chain: Chain,
-}
-
-impl Linearization {
-    /// This linearization without the columns of known quantities.
-    pub(crate) fn without_known(&self, poses: &PoseKnowledge, joints: &JointKnowledge) -> Self {
-        let count = |group: ColumnGroup| match (group, poses, joints) {
-            (ColumnGroup::Joints, _, JointKnowledge::Known)
-            | (ColumnGroup::Pose | ColumnGroup::VelocityBias, PoseKnowledge::Known, _) => 0,
-            // Keeps the velocity; the biases follow it in the block.
-            (ColumnGroup::VelocityBias, PoseKnowledge::Imu { biases_known: true, .. }, _) => 3,
-            _ => usize::MAX,
-        };
-        let (mut kept, mut columns) = (Vec::new(), Vec::new());
-        for block in &self.columns {
-            let len = block.len.min(count(block.id.group()));
-            if len > 0 {
-                columns.push(ColumnBlock { start: kept.len(), len, ..*block });
-                kept.extend(block.start..block.start + len);
-            }
-        }
-        Self {
-            columns,
-            jacobian: self.jacobian.select_columns(&kept),
-            prior_jacobian: self.prior_jacobian.select_columns(&kept),
-            ..self.clone()
-        }
-    }
 }
 
 impl Problem<'_> {

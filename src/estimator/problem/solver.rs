@@ -1,4 +1,8 @@
-//! Levenberg–Marquardt solver of the window, landmarks eliminated.
+//! Levenberg–Marquardt solver of the window, landmarks eliminated: minimizes Eq. 8 by steps δ with
+//!
+//! ```text
+//! (H + λ diag H) δ = −g    H = JᵀJ    g = Jᵀr
+//! ```
 
 use std::mem;
 use std::rc::Rc;

@@ -270,7 +270,13 @@ fn moving_map(stamped: &FrameState, own: &DMatrix<f64>, by_rotation: &Matrix6x3<
 }
 
 /// Derivatives of the camera pose with respect to pose and joints of its frame (6 × (6 + N)) and to its
-/// calibration (6 × columns), at this attitude of the IMU.
+/// calibration (6 × columns), at this attitude of the IMU (Eqs. 13, 14 in the right convention):
+///
+/// ```text
+/// φ_C = R_ICᵀ φ + J_φ q    p_C = p − R_WI [t_IC]× φ + R_WI J_t q
+/// ```
+///
+/// with `[J_φ; J_t]` of `T_IC` by joint angles and parameters q.
 pub(crate) fn camera_map(
     world_from_imu: &Matrix3<f64>,
     joints: usize,

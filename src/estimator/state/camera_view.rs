@@ -162,10 +162,10 @@ impl<'a> CameraView<'a> {
     /// Converts derivatives by `pose`, the pose at an observation's row (2 × 6), to derivatives by the blocks of its
     /// frame.
     ///
-    /// A change of the pose is interpolated between the first, the middle and the last row by a parabola, rotations in
-    /// world axes; `N` is [`Self::blocks_per_frame`]. The interpolation is exact for changes of pose, velocity, readout
-    /// time, joint rates and joint accelerations, except that the rotation of their axes during the readout is of
-    /// second order.
+    /// A change of the pose at the fraction f of the image is interpolated between the first, the middle and the last row
+    /// by a parabola, `(2f − 1)(f − 1)`, `4f (1 − f)` and `f (2f − 1)` of them, rotations in world axes; `N` is
+    /// [`Self::blocks_per_frame`]. The interpolation is exact for changes of pose, velocity, readout time, joint rates and
+    /// joint accelerations, except that the rotation of their axes during the readout is of second order.
     pub(crate) fn by_blocks<const N: usize>(
         &self,
         observation: &TrackObservation,

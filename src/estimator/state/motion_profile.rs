@@ -91,7 +91,11 @@ impl MotionProfile {
         Self { bias, gravity_in_world, knots: vec![knot] }
     }
 
-    /// Motion over `time_s` from the stamp, at a gyroscope bias.
+    /// Motion over `time_s` from the stamp, at a gyroscope bias: from the knot k before that time, τ seconds earlier,
+    ///
+    /// ```text
+    /// ΔR = ΔR_k Exp(φ) Exp(−δb_g t)    Δv = Δv_k + a τ    Δp = Δp_k + Δv_k τ + ½ a τ²
+    /// ```
     ///
     /// Between samples the rotation is interpolated at a constant rate, the position with constant specific force;
     /// outside the samples, rate and specific force of the nearest one apply. A change of the gyroscope bias corrects

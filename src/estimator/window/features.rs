@@ -66,7 +66,11 @@ pub(crate) fn drop_frame(features: &mut FeatureMap, gone: usize, view: &CameraVi
     features.retain(|_, feature| !feature.observations.is_empty());
 }
 
-/// Transforms a landmark to another camera; `None` when it lies in the centre of that camera.
+/// Transforms a landmark to another camera; `None` when it lies in the centre of that camera:
+///
+/// ```text
+/// d = R_WCi b + λ (p_Ci − p_Cj)    b' = R_WCjᵀ d / |d|    λ' = λ / |d|
+/// ```
 fn moved(landmark: &Landmark, from: &CameraPose, to: &CameraPose) -> Option<Landmark> {
     let direction_in_world =
         from.rotation * landmark.bearing + (from.position_m - to.position_m) * landmark.inverse_distance;

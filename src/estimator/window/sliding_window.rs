@@ -54,42 +54,57 @@ impl SlidingWindow {
         Self { state, monitors: Monitors::default() }
     }
 
-    /// Processes the tracks of an image with the IMU samples before it.
+    /// Processes the tracks of an image with the IMU samples before it: estimates with its frame, reports, then removes
+    /// outliers and a frame.
     pub(crate) fn step(&mut self, setup: &Setup, input: &StepInput<'_>) -> Result<StepReport, WindowFailure> {
-        let newest_stamp_ns = self.state.frames.newest().stamp_ns;
-        if input.stamp_ns <= newest_stamp_ns {
-            return Ok(self.skip(setup, input, newest_stamp_ns));
+        let before_ns = self.state.frames.newest().stamp_ns;
+        if input.stamp_ns <= before_ns {
+            return Ok(self.skip(setup, input, before_ns));
         }
-        let options = &setup.config.options;
         let begin_ms = setup.clock_ms();
-        if let Err(failure) = self.push_frame(setup, input) {
-            return Err(self.failed(input, vec![failure]));
-        }
-        let mut events: Vec<Event> = saturation(self.state.frames.newest()).into_iter().collect();
-        events.extend(self.detect_stationary(setup, input));
-        let predicted = self.state.frames.newest().state.navigation;
-        let mut solved = self.state.solve(setup, options.iterations);
-        events.extend(self.monitors.landmarks.observe(&self.state, options));
-        if let Some(failure) = failure(self.state.frames.newest(), &predicted, &self.monitors.landmarks, options) {
-            events.push(failure);
-            return Err(self.failed(input, events));
-        }
-        events.push(self.state.choose_keyframe(setup));
-        let optimized_ms = setup.clock_ms();
-
+        let mut events = Vec::new();
+        let mut solved = match self.estimate(setup, input, &mut events) {
+            Ok(solved) => solved,
+            Err(failure) => {
+                events.push(failure);
+                return Err(self.failed(input, events));
+            }
+        };
+        let optimize_ms = setup.clock_ms() - begin_ms;
         let mut report = self.report(setup, input, &mut solved);
+        report.times.optimize_ms = optimize_ms;
         let marginalizing_ms = setup.clock_ms();
         let scores = || self.state.sensor_scores(setup);
-        let warnings = self.monitors.consistency.observe(report.stamp_ns, &report.residuals, &setup.config, scores);
-        self.state.drop_rejected(&solved, options, &mut events);
+        report.warnings = self.monitors.consistency.observe(report.stamp_ns, &report.residuals, &setup.config, scores);
+        self.state.drop_rejected(&solved, &setup.config.options, &mut events);
         events.extend(self.switch_near_singularity(setup));
         self.state.drop_or_marginalize_frame(setup, &mut events);
-        self.state.follow_residuals(setup, &solved, seconds_from_ns(input.stamp_ns - newest_stamp_ns));
-        report.times.optimize_ms = optimized_ms - begin_ms;
+        self.state.follow_residuals(setup, &solved, seconds_from_ns(input.stamp_ns - before_ns));
         report.times.marginalize_ms = setup.clock_ms() - marginalizing_ms;
         report.events.extend(events);
-        report.warnings = warnings;
         Ok(report)
+    }
+
+    /// Adds the frame of an image, solves the window and decides on the keyframe; the error is the failure of the window.
+    fn estimate(
+        &mut self,
+        setup: &Setup,
+        input: &StepInput<'_>,
+        events: &mut Vec<Event>,
+    ) -> Result<SolvedWindow, Event> {
+        let options = &setup.config.options;
+        self.push_frame(setup, input)?;
+        events.extend(saturation(self.state.frames.newest()));
+        events.extend(self.detect_stationary(setup, input));
+        let predicted = self.state.frames.newest().state.navigation;
+        let solved = self.state.solve(setup, options.iterations);
+        events.extend(self.monitors.landmarks.observe(&self.state, options));
+        let newest = self.state.frames.newest();
+        if let Some(failure) = failure(newest, &predicted, &self.monitors.landmarks, options) {
+            return Err(failure);
+        }
+        events.push(self.state.choose_keyframe(setup));
+        Ok(solved)
     }
 
     pub(crate) fn report(&mut self, setup: &Setup, input: &StepInput<'_>, solved: &mut SolvedWindow) -> StepReport {
