@@ -8,9 +8,9 @@ use super::state::calibrations::{Calibrations, MAIN};
 use super::state::earlier_pass::BiasPrior;
 use super::state::earlier_pass::EarlierPass;
 use super::step_input::StepInput;
-use super::window::covariances;
 use super::window::setup::Setup;
 use super::window::sliding_window::{SlidingWindow, WindowFailure};
+use super::window::solve::covariances;
 use crate::geometry::RigidTransform;
 use crate::gimbal::ClassicalChain;
 
@@ -147,7 +147,7 @@ impl Estimator {
         if window.state.calibration.dof() == 0 {
             return None;
         }
-        let covariances = covariances::covariances(&self.setup, &window.state)?;
+        let covariances = covariances(&self.setup, &window.state)?;
         window.state.calibration.posterior(&covariances.calibration)
     }
 
@@ -169,7 +169,7 @@ impl Estimator {
     /// The intrinsics of the IMU are not included: they restart at the rig's prior.
     pub fn findings(&self, duration_s: f64) -> Option<EarlierPass> {
         let PhaseState::Tracking(window) = &self.phase else { return None };
-        let covariances = covariances::covariances(&self.setup, &window.state)?;
+        let covariances = covariances(&self.setup, &window.state)?;
         let calibrations = &window.state.calibration;
         let cameras = (0..calibrations.cameras()).map(|camera| {
             let columns = calibrations.columns(camera);

@@ -45,7 +45,7 @@ pub use state::calibration::INACCURATE_ROTATION_RAD;
 pub use state::calibration_posterior::{CalibrationPosterior, CalibrationPrior, CameraPosterior};
 pub use state::columns::{ColumnBlock, ColumnGroup, ColumnId, FrameId};
 pub use state::earlier_pass::{BiasPrior, EarlierPass};
-pub use state::gimbal_imu::GimbalImuState;
+pub use state::navigation::GimbalImuState;
 pub use state::preintegration::{self, ImuBias, MotionIncrement, NavigationState, Preintegration};
 pub use step_input::{StepInput, StepMeasurements};
 pub use window::setup::gravity_in_world;

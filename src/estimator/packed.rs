@@ -3,7 +3,7 @@
 use super::estimator::{Estimator, PhaseState};
 use super::start::initializer::Initializer;
 use super::step_input::StepMeasurements;
-use super::window::packed::PackedWindow;
+use super::window::packed_window::PackedWindow;
 use super::window::setup::Setup;
 use crate::geometry::RigidTransform;
 

@@ -2,21 +2,9 @@
 
 use nalgebra::DMatrix;
 
+use super::Deficit;
 use crate::geometry::{Dimension, dense};
 use crate::gimbal::{Chain, generic_joint_angles, stacked_jacobian};
-
-/// Number of unobservable columns by cause.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Deficits {
-    /// Redundant in the parameterization, or at its singularity: unobservable at all joint angles.
-    pub(super) parameterization: usize,
-    /// Unobservable at the joint angles of the window.
-    pub(super) joints: usize,
-    /// Unobservable because unknown joint angles absorb them in every frame.
-    pub(super) absorbed: usize,
-    /// All others: due to the motion of the vehicle, and the scene.
-    pub(super) motion: usize,
-}
 
 /// Splits the deficit `columns − rank` by cause, as differences of ranks of the chain's Jacobians; the columns
 /// `kept` are unknown.
@@ -34,7 +22,7 @@ pub(super) fn classify(
     joints_free: bool,
     columns: usize,
     rank: usize,
-) -> Deficits {
+) -> Deficit {
     let deficit = columns.saturating_sub(rank);
     let generic = generic_joint_angles(chain.joint_count(), 4 * (chain.joint_count() + 1));
     let anywhere = scaled_stack(chain, &generic).select_columns(kept);
@@ -44,7 +32,7 @@ pub(super) fn classify(
     let others = columns.saturating_sub(kept.len());
     let parameterization = columns.saturating_sub(anywhere + others).min(deficit);
     if joint_angles_rad.is_empty() {
-        return Deficits { parameterization, joints: 0, absorbed: 0, motion: deficit - parameterization };
+        return Deficit { parameterization, joints: 0, absorbed: 0, motion: deficit - parameterization };
     }
     let mut stack = scaled_stack(chain, joint_angles_rad).select_columns(kept);
     let values = singular_values(&stack);
@@ -57,7 +45,7 @@ pub(super) fn classify(
         let unabsorbed = rank_above(&stack, &singular_values(&stack), reference).min(here);
         absorbed = (here - unabsorbed).min(deficit - parameterization - joints);
     }
-    Deficits { parameterization, joints, absorbed, motion: deficit - parameterization - joints - absorbed }
+    Deficit { parameterization, joints, absorbed, motion: deficit - parameterization - joints - absorbed }
 }
 
 /// Returns orthonormal directions (dof × k, in units of 10° and 3 cm) that are observable under some motion of joints

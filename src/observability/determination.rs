@@ -1,4 +1,4 @@
-//! Scale of words for the quality of a calibration parameter after a flight.
+//! Scale of words for the quality of a calibration parameter after a flight, and the causes of a loss.
 
 use serde::{Serialize, Serializer};
 
@@ -70,6 +70,34 @@ impl Determination {
     /// True if motion or further sensors can improve the parameter.
     pub fn is_improvable(self) -> bool {
         matches!(self, Self::WeaklyDetermined | Self::NotDetermined)
+    }
+}
+
+/// Cause for which a parameter is not determined, as in the rank deficit of a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum LossCause {
+    /// Redundant in the parameterization, or at its singularity.
+    Parameterization,
+    /// Joints that did not move in most windows.
+    StationaryJoints,
+    /// Unknown joint angles absorb the parameter in most windows.
+    FreeJointAngles,
+    /// Motion of vehicle and joints.
+    Motion,
+}
+
+impl Named for LossCause {
+    const NAMES: &'static [(Self, &'static str)] = &[
+        (Self::Parameterization, "parameterization"),
+        (Self::StationaryJoints, "stationary joints"),
+        (Self::FreeJointAngles, "free joint angles"),
+        (Self::Motion, "motion"),
+    ];
+}
+
+impl Serialize for LossCause {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
     }
 }
 

@@ -45,13 +45,13 @@ pub struct RankReport {
 /// Number of unobservable columns by cause.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Deficit {
-    /// Redundant in the parameterization, or at its singularity (G).
+    /// Redundant in the parameterization, or at its singularity: unobservable at all joint angles (G).
     pub parameterization: usize,
-    /// Joints that did not move (F).
+    /// Unobservable at the joint angles of the window: joints that did not move (F).
     pub joints: usize,
-    /// Absorbed by free joint angles (E).
+    /// Absorbed by free joint angles in every frame (E).
     pub absorbed: usize,
-    /// Motion of the vehicle and scene (M).
+    /// All others: motion of the vehicle and scene (M).
     pub motion: usize,
 }
 

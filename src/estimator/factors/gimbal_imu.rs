@@ -16,7 +16,7 @@ use crate::estimator::state::calibration::Calibration;
 use crate::estimator::state::calibrations::MAIN;
 use crate::estimator::state::frame::InformedMotion;
 use crate::estimator::state::frame_state::FrameState;
-use crate::estimator::state::gimbal_imu_mount::GimbalImuMount;
+use crate::estimator::state::gimbal_imu::GimbalImuMount;
 use crate::estimator::state::layout::{POSE, VELOCITY_BIAS};
 use crate::estimator::state::navigation::{Matrix15, NavigationState, Vector15};
 use crate::sensors::ImuSample;

@@ -16,7 +16,6 @@ pub(crate) mod kind;
 pub(crate) mod labelled_rows;
 pub(crate) mod marginal_prior;
 pub(crate) mod measurements;
-pub(crate) mod packed_prior;
 pub(crate) mod projected_rows;
 pub(crate) mod reprojection;
 pub(crate) mod start_prior;

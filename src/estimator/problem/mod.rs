@@ -10,4 +10,3 @@ pub(crate) mod motion_parts;
 #[expect(clippy::module_inception, reason = "the type that the folder is about")]
 pub(crate) mod problem;
 pub(crate) mod solver;
-mod visual_rows;

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, Quaternion, UnitQuaternion, Vector3};
 use crate::estimator::factors::kind::{FactorKind, FactorLabel};
 use crate::estimator::state::allocation::allocated_bytes;
 use crate::estimator::state::calibrations::Calibrations;
-use crate::estimator::state::columns::FrameId;
+use crate::estimator::state::columns::{ColumnBlock, FrameId};
 use crate::estimator::state::frame_state::{FrameState, Rates};
 use crate::estimator::state::layout::POSE;
 use crate::estimator::state::navigation::{ImuBias, NavigationState};
@@ -223,3 +223,13 @@ impl JacobianSource {
 
 /// Number of values of a pose in `JacobianSource::frames`: quaternion and position.
 const POSE_NUMBERS: usize = 7;
+
+/// Indices and Frobenius norms of the nonzero column blocks of some rows, columns in units of their scales.
+pub(crate) fn block_norms(rows: &DMatrix<f64>, columns: &[ColumnBlock], scales: &[f64]) -> Vec<(u16, f32)> {
+    let squared = |block: &ColumnBlock| {
+        let entries = |column: usize| rows.column(column).iter().map(|it| (it * scales[column]).powi(2)).sum::<f64>();
+        (block.start..block.start + block.len).map(entries).sum::<f64>()
+    };
+    let squared = columns.iter().map(squared).enumerate().filter(|(_, squared)| *squared > 0.0);
+    squared.map(|(number, squared)| (number as u16, squared.sqrt() as f32)).collect()
+}

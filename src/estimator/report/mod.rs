@@ -10,7 +10,6 @@ mod observations;
 mod pose_covariance;
 mod residuals;
 mod step;
-mod step_warning;
 
 pub use events::{Event, EventKind, FailureCause};
 pub use features::{FeatureCounts, FeatureReport, LandmarkReport};
@@ -18,6 +17,5 @@ pub use footprint::ReportBytes;
 pub use jacobian_source::{FactorRows, JacobianFactor, JacobianRow, JacobianSource};
 pub use observations::{ObservationReport, Observations};
 pub use pose_covariance::PoseCovariance;
-pub use residuals::ResidualSummary;
+pub use residuals::{ResidualSummary, StepWarning};
 pub use step::{CalibrationEstimate, FrameStateReport, Phase, StageTimes, StepReport};
-pub use step_warning::StepWarning;

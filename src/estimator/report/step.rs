@@ -8,7 +8,7 @@ use super::{Event, FactorRows, FeatureReport, JacobianSource, ResidualSummary, S
 use crate::estimator::problem::information_gain::InformationGain;
 use crate::estimator::problem::linearization::Linearization;
 use crate::estimator::problem::solver::IterationReport;
-use crate::estimator::state::gimbal_imu::GimbalImuState;
+use crate::estimator::state::navigation::GimbalImuState;
 use crate::frontend::FeatureId;
 use crate::geometry::RigidTransform;
 use crate::gimbal::{ClassicalChain, ParameterId, Parameterization, Singularity};

@@ -3,8 +3,7 @@
 use std::borrow::Cow;
 use std::collections::VecDeque;
 
-use super::first_window::FirstWindow;
-use super::waiting_frame::{WaitingFrame, initial_joints_rad};
+use super::first_window::{FirstWindow, WaitingFrame, initial_joints_rad};
 use crate::estimator::initialization::{
     InitializationFrame, InitializationInput, InitializationOptions, InitializationOutcome, InitializationSolution,
     StationaryEstimate, WaitReason, try_initialize,
@@ -12,8 +11,7 @@ use crate::estimator::initialization::{
 use crate::estimator::report::{Event, EventKind, Phase, StepReport};
 use crate::estimator::state::calibrations::{Calibrations, MAIN};
 use crate::estimator::step_input::StepInput;
-use crate::estimator::window::calibration_columns::calibration_estimate;
-use crate::estimator::window::reporting::empty_report;
+use crate::estimator::window::reporting::{calibration_estimate, empty_report};
 use crate::estimator::window::setup::Setup;
 use crate::estimator::window::sliding_window::SlidingWindow;
 use crate::frontend::FeatureId;

@@ -3,4 +3,3 @@
 mod extrinsics_fit;
 mod first_window;
 pub(crate) mod initializer;
-mod waiting_frame;

@@ -5,9 +5,9 @@ use std::sync::Arc;
 use nalgebra::{DVector, Vector3};
 
 use super::allocation::allocated_bytes;
-use super::gimbal_imu::GimbalImuState;
 use super::layout::{POSE, VELOCITY_BIAS};
 use super::motion_profile::{MotionProfile, RowMotion};
+use super::navigation::GimbalImuState;
 use super::navigation::{NavigationState, Vector15};
 use crate::geometry::{so3, wrap_angle};
 use crate::sensors::{ImuSample, JointAngles};

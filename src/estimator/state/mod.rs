@@ -14,7 +14,6 @@ pub(crate) mod estimate;
 pub(crate) mod frame;
 pub(crate) mod frame_state;
 pub(crate) mod gimbal_imu;
-pub(crate) mod gimbal_imu_mount;
 pub(crate) mod given_chain;
 pub(crate) mod imu_calibration;
 pub(crate) mod imu_errors;

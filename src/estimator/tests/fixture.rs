@@ -17,7 +17,7 @@ use crate::estimator::state::frame::{Frame, layout};
 use crate::estimator::state::frame_state::{FrameState, Rates};
 use crate::estimator::state::navigation::{ImuBias, NavigationState};
 use crate::estimator::state::preintegration::Preintegration;
-use crate::estimator::window::active_tracks::ActiveTracks;
+use crate::estimator::window::features::ActiveTracks;
 use crate::estimator::window::features::{self, FeatureMap};
 use crate::estimator::window::frames::Frames;
 use crate::estimator::window::loss_scale::LossScale;

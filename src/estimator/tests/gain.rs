@@ -13,7 +13,7 @@ use crate::estimator::problem::problem::Problem;
 use crate::estimator::state::camera_pose::CameraMaps;
 use crate::estimator::state::columns::{ColumnGroup, ColumnId, FrameId};
 use crate::estimator::state::estimate::Estimate;
-use crate::estimator::window::active_tracks::ActiveTracks;
+use crate::estimator::window::features::ActiveTracks;
 use crate::gimbal::Parameterization;
 use crate::gimbal::tests::parameter;
 use crate::optimization::RobustLoss;

@@ -11,8 +11,8 @@ use crate::estimator::problem::marginalization;
 use crate::estimator::problem::solver::{self, SolverLimits};
 use crate::estimator::state::calibrations::MAIN;
 use crate::estimator::state::estimate::Estimate;
-use crate::estimator::window::covariances;
 use crate::estimator::window::drop_or_marginalize_frame;
+use crate::estimator::window::solve::covariances;
 use crate::geometry::triangular_factor;
 use crate::gimbal::Parameterization;
 use crate::optimization::{Cholesky, RobustLoss};
@@ -295,7 +295,7 @@ fn the_covariance_of_a_solve_is_without_damping() {
     for (name, mut estimator) in windows() {
         for (scale, iterations) in [(0.0, 1), (4.0, 1), (8.0, 2), (16.0, 3), (32.0, 4)] {
             fixture::disturb(&mut estimator, scale);
-            let expected = covariances::covariances(&estimator.setup, &estimator.window);
+            let expected = covariances(&estimator.setup, &estimator.window);
             let solution = estimator.window.solve(&estimator.setup, iterations).solution;
             let Some(last) = solution.iterations.last() else { continue };
             rejected += usize::from(!last.accepted);
@@ -303,7 +303,7 @@ fn the_covariance_of_a_solve_is_without_damping() {
             let expected = match last.accepted {
                 true if scale > 0.0 => continue,
                 true => expected,
-                false => covariances::covariances(&estimator.setup, &estimator.window),
+                false => covariances(&estimator.setup, &estimator.window),
             };
             let Some(expected) = expected else { continue };
             let difference = (&solution.calibration_covariance - &expected.calibration).amax();

@@ -1,7 +1,6 @@
 //! Removal of frames from the window.
 
-use super::active_tracks::ActiveTracks;
-use super::features::{self, FeatureMap};
+use super::features::{self, ActiveTracks, FeatureMap};
 use super::setup::Setup;
 use super::window_state::WindowState;
 use crate::estimator::config::{EstimatorOptions, TrackContinuation};

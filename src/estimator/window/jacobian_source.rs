@@ -1,16 +1,14 @@
 //! Data of a solved window from which the report reproduces the Jacobian of the step.
 
-use nalgebra::DMatrixView;
-
 use super::setup::Setup;
 use super::solve::SolvedWindow;
 use super::window_state::WindowState;
 use crate::estimator::factors::labelled_rows::{LabelledRows, stack};
 use crate::estimator::factors::measurements::measurements;
-use crate::estimator::report::jacobian_source::{ClockColumns, ExactSource, PackedRow};
+use crate::estimator::report::jacobian_source::{ClockColumns, ExactSource, PackedRow, block_norms};
 use crate::estimator::report::{FactorRows, JacobianFactor, JacobianSource};
 use crate::estimator::state::calibrations::Calibrations;
-use crate::estimator::state::columns::{ColumnBlock, FrameId, scales_of};
+use crate::estimator::state::columns::{FrameId, scales_of};
 use crate::estimator::state::frame_state::FrameState;
 
 impl WindowState {
@@ -36,7 +34,7 @@ impl WindowState {
         problem.priors(&point, &mut rows);
         for (label, rows) in rows.by_factor() {
             let rows = stack([&rows], order.iter().copied().chain([total]));
-            let of_factor = norms_of(&rows.columns(0, total), &columns, &scales);
+            let of_factor = block_norms(&rows, &columns, &scales);
             packed.push(PackedRow { label, height: rows.nrows() as u16, count: of_factor.len() as u16 });
             norms.extend(of_factor);
             let factor = JacobianFactor::of(label, &numbers).filter(|_| setup.config.options.keep_factor_rows);
@@ -90,22 +88,4 @@ impl WindowState {
         };
         (source, kept)
     }
-}
-
-/// Indices and norms of the nonzero column blocks of some rows.
-fn norms_of(jacobian: &DMatrixView<'_, f64>, columns: &[ColumnBlock], scales: &[f64]) -> Vec<(u16, f32)> {
-    let mut norms: Vec<(u16, f32)> = Vec::new();
-    for (number, block) in columns.iter().enumerate() {
-        let range = block.start..block.start + block.len;
-        let squared: f64 = range
-            .map(|column| {
-                let entries = jacobian.column(column);
-                entries.iter().map(|entry| (entry * scales[column]).powi(2)).sum::<f64>()
-            })
-            .sum();
-        if squared > 0.0 {
-            norms.push((number as u16, squared.sqrt() as f32));
-        }
-    }
-    norms
 }

@@ -3,11 +3,8 @@
 //! [`SlidingWindow::step`](sliding_window::SlidingWindow::step) processes an image and returns a report or a
 //! failure; a window always has at least one frame.
 
-pub(crate) mod active_tracks;
-pub(crate) mod calibration_columns;
 pub(crate) mod column_groups;
 pub(crate) mod consistency;
-pub(crate) mod covariances;
 pub(crate) mod drop_or_marginalize_frame;
 pub(crate) mod failure;
 pub(crate) mod features;
@@ -17,7 +14,7 @@ pub(crate) mod jacobian_source;
 pub(crate) mod joints;
 pub(crate) mod keyframes;
 pub(crate) mod loss_scale;
-pub(crate) mod packed;
+pub(crate) mod packed_window;
 pub(crate) mod reporting;
 pub(crate) mod setup;
 pub(crate) mod sliding_window;

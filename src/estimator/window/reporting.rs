@@ -10,7 +10,7 @@ use crate::estimator::report::{
     CalibrationEstimate, FeatureCounts, FeatureReport, FrameStateReport, LandmarkReport, ObservationReport, Phase,
     PoseCovariance, ResidualSummary, StageTimes, StepReport,
 };
-use crate::estimator::state::calibrations::MAIN;
+use crate::estimator::state::calibrations::{Calibrations, MAIN};
 use crate::estimator::step_input::StepInput;
 use crate::text::Named as _;
 
@@ -203,4 +203,31 @@ fn root_mean_square<'a>(residuals: impl Iterator<Item = &'a TrackResiduals>) -> 
         .flatten()
         .fold((0.0, 0_usize), |(sum, count), residual| (sum + residual.norm_squared(), count + 1));
     (sum / count.max(1) as f64).sqrt()
+}
+
+/// Static calibration with the standard deviations of its columns: NaN before a solve, zero if it is fixed.
+pub(crate) fn calibration_estimate(setup: &Setup, calibration: &Calibrations, sigmas: &[f64]) -> CalibrationEstimate {
+    let cameras = || (0..calibration.cameras()).map(|camera| calibration.of(camera));
+    let parameters = calibration.parameters();
+    let chain = calibration.of(MAIN).chain();
+    let sigmas = if calibration.dof() == 0 {
+        vec![0.0; parameters.len()]
+    } else if sigmas.len() == parameters.len() {
+        sigmas.to_vec()
+    } else {
+        vec![f64::NAN; parameters.len()]
+    };
+    let rigid_cameras = setup.config.rigid_cameras.iter().zip(cameras().skip(1));
+    CalibrationEstimate {
+        parameterization: chain.parameterization(),
+        parameters,
+        values: calibration.values(),
+        sigmas,
+        prior_sigmas: calibration.prior_sigmas(),
+        classical: chain.to_classical(),
+        margins: chain.margins(),
+        rigid_cameras: rigid_cameras
+            .map(|(camera, calibration)| (camera.key.clone(), calibration.imu_from_camera(&[])))
+            .collect(),
+    }
 }

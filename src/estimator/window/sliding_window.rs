@@ -1,10 +1,9 @@
 //! Running window. A step predicts, solves, rejects outliers, selects keyframes and removes a frame.
 
-use super::calibration_columns::calibration_estimate;
 use super::consistency::ConsistencyMonitor;
 use super::failure::{LandmarkWatch, failure, saturation};
 use super::features::{self, FeatureMap};
-use super::reporting::empty_report;
+use super::reporting::{calibration_estimate, empty_report};
 use super::setup::Setup;
 use super::solve::SolvedWindow;
 use super::stationary::{Observed, StationaryDetector};

@@ -1,7 +1,6 @@
 //! State from which the least-squares problem of the window is built.
 
-use super::active_tracks::ActiveTracks;
-use super::features::{self, FeatureMap};
+use super::features::{self, ActiveTracks, FeatureMap};
 use super::frames::Frames;
 use super::loss_scale::LossScale;
 use super::setup::Setup;

@@ -1,9 +1,13 @@
 //! Moves of the suggested excitation, and the same with a second joint, with the amplitudes that the limits admit.
 
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
 use super::super::advice::candidates;
 use super::moves::HandMove;
 use super::search::{CHECK_STEP_S, MARGIN, SearchProblem};
 use super::starts;
+use crate::simulation::MotionSplines;
 
 /// Step at which swings are compared with the ranges of the limits, in seconds.
 const RANGE_STEP_S: f64 = 0.05;
@@ -43,4 +47,24 @@ pub(super) fn combined(problem: &SearchProblem<'_>, duration_s: f64) -> Vec<Hand
         moves.extend(seconds.map(|second| HandMove { second: Some(second), ..*first }));
     }
     moves
+}
+
+/// A listed motion that continues over a whole flight.
+#[derive(Clone, Debug)]
+pub(super) struct RepeatedMove {
+    pub(super) choice: HandMove,
+    pub(super) motion: MotionSplines,
+    /// Information about the calibration at the end.
+    pub(super) information: DMatrix<f64>,
+}
+
+impl RepeatedMove {
+    /// All listed motions over a flight of this duration.
+    pub(super) fn all(problem: &SearchProblem<'_>, duration_s: f64) -> Vec<Self> {
+        let of = |choice: HandMove| {
+            let flown = problem.evaluate(starts::as_described(problem, duration_s, &[choice]))?;
+            Some(Self { choice, information: problem.total(&flown.windows), motion: flown.motion })
+        };
+        listed(problem, duration_s).into_par_iter().filter_map(of).collect()
+    }
 }

@@ -6,14 +6,12 @@
 
 mod admitted;
 mod by_hand;
-mod edit;
 mod keyframes;
 mod limits;
 mod moves;
 mod objective;
 mod plan;
 mod problem;
-mod repeated;
 mod search;
 mod starts;
 mod summary;
@@ -22,7 +20,6 @@ mod tests;
 mod windows;
 
 pub use by_hand::{HandPlan, HandStep};
-pub use edit::move_point;
 pub use limits::{EnteredLimits, MotionLimits, ReachedLimit};
 pub use objective::PlanCriterion;
 pub use plan::{
@@ -30,6 +27,7 @@ pub use plan::{
     plan_motion,
 };
 pub use problem::{MotionPrediction, MotionPredictor, MotionProblem, MotionStart};
+pub use search::move_point;
 pub use starts::PLAN_KNOT_S;
 pub use summary::{PlanTable, PlannedParameter, SigmaRow};
 pub use windows::{SCENE_M, scene_distances_m};

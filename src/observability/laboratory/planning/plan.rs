@@ -8,10 +8,10 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::super::Situation;
+use super::admitted::RepeatedMove;
 use super::by_hand::{HandPlan, choose};
 use super::limits::{MotionLimits, ReachedLimit};
 use super::objective::{Objective, PlanCriterion};
-use super::repeated::RepeatedMove;
 use super::search::{FINE_WEIGHT, SearchProblem, SearchProgress, SearchedMotion};
 use super::starts;
 use super::summary::{PlanTable, SigmaRow};

@@ -3,9 +3,9 @@ use std::ops::ControlFlow;
 use nalgebra::{DMatrix, Vector3};
 
 use super::super::{LaboratoryJoint, Mechanism, Situation};
+use super::admitted::RepeatedMove;
 use super::keyframes::keyframe_times_s;
 use super::objective::Objective;
-use super::repeated::RepeatedMove;
 use super::search::SearchProblem;
 use super::windows::{WindowLayout, WindowRows, joined, rows_of_interval, rows_of_keyframes, trajectory};
 use super::{

@@ -7,6 +7,7 @@ use nalgebra::{DMatrix, Vector3};
 
 use crate::camera::CameraModel;
 use crate::estimator::factors::reprojection::{Anchor, RobustWeight, VisualModel, whitened};
+use crate::estimator::report::jacobian_source::block_norms;
 use crate::estimator::report::{FeatureReport, JacobianFactor, JacobianRow, JacobianSource, StepReport};
 use crate::estimator::state::camera_pose::{self, CameraCalibration, CameraMaps};
 use crate::estimator::state::camera_view::{CameraView, ROLLING_BLOCKS};
@@ -205,14 +206,7 @@ impl<'a> Writer<'a> {
             // The scale of an inverse depth is relative: a tenth of its value.
             *last = ColumnId::InverseDepth.scale(0) * feature.inverse_depth_per_m.abs();
         }
-        let mut norms = Vec::new();
-        for (number, block) in self.columns.iter().enumerate() {
-            let range = block.start..block.start + block.len;
-            let squared: f64 = range.map(|column| (written.rows.column(column) * scales[column]).norm_squared()).sum();
-            if squared > 0.0 {
-                norms.push((number as u16, squared.sqrt() as f32));
-            }
-        }
+        let norms = block_norms(&written.rows, &self.columns, &scales);
         JacobianRow { factor: JacobianFactor::Feature(feature.id), height: written.rows.nrows(), norms }
     }
 }

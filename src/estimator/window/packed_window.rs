@@ -1,20 +1,23 @@
-//! Running window without recomputable data.
+//! Running window without what the inputs of earlier steps reproduce to the same bits.
 
-use super::packed_features::PackedFeatures;
-use crate::estimator::factors::packed_prior::PackedPrior;
+use nalgebra::{DMatrix, DVector};
+
+use crate::estimator::factors::marginal_prior::{Prior, PriorColumn};
 use crate::estimator::factors::start_prior::StartPrior;
 use crate::estimator::state::calibrations::Calibrations;
-use crate::estimator::state::frame::Stationary;
-use crate::estimator::state::frame::{Frame, InformedMotion};
+use crate::estimator::state::frame::{Frame, InformedMotion, Stationary};
 use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::state::imu_errors::ImuErrors;
 use crate::estimator::state::navigation::ImuBias;
 use crate::estimator::state::preintegration::Preintegration;
 use crate::estimator::step_input::StepMeasurements;
+use crate::estimator::window::features::{Feature, FeatureMap, FeatureObservation};
 use crate::estimator::window::frames::Frames;
 use crate::estimator::window::loss_scale::LossScale;
 use crate::estimator::window::sliding_window::{Monitors, SlidingWindow};
 use crate::estimator::window::window_state::WindowState;
+use crate::frontend::FeatureId;
+use crate::optimization::Landmark;
 use crate::sensors::{ImuNoise, ImuSample, JointAngles};
 
 /// [`SlidingWindow`] whose measurements are references to the inputs of earlier steps.
@@ -226,4 +229,117 @@ fn steps_with(samples: &[ImuSample], past: &[&dyn StepMeasurements], imu: Packed
         }
     }
     expected.next().is_none().then_some((begin, end))
+}
+
+#[derive(Clone, Debug)]
+struct PackedFeatures {
+    features: Vec<PackedFeature>,
+    /// Twice the slot of each observation, plus one if it is copied.
+    observations: Vec<u16>,
+    /// Copied observations: those missing in the step of their frame.
+    own: Vec<FeatureObservation>,
+}
+
+#[derive(Clone, Debug)]
+struct PackedFeature {
+    id: FeatureId,
+    landmark: Option<Landmark>,
+    count: u32,
+}
+
+impl PackedFeatures {
+    /// `steps` are those of the window's frames, by slot.
+    fn new(features: &FeatureMap, steps: &[Option<&dyn StepMeasurements>], camera: usize) -> Self {
+        let count = features.values().map(|feature| feature.observations.len()).sum();
+        let mut packed = Self {
+            features: Vec::with_capacity(features.len()),
+            observations: Vec::with_capacity(count),
+            own: Vec::new(),
+        };
+        for (id, feature) in features {
+            for observation in &feature.observations {
+                let copied = observation_of(steps, observation.slot, camera, *id) != Some(*observation);
+                packed.observations.push(2 * observation.slot as u16 + u16::from(copied));
+                packed.own.extend(copied.then_some(*observation));
+            }
+            let count = feature.observations.len() as u32;
+            packed.features.push(PackedFeature { id: *id, landmark: feature.landmark, count });
+        }
+        packed
+    }
+
+    fn unpacked(&self, steps: &[Option<&dyn StepMeasurements>], camera: usize) -> FeatureMap {
+        let (mut observations, mut own) = (self.observations.iter(), self.own.iter());
+        let mut feature = |packed: &PackedFeature| {
+            let observation = |place: &u16| match place % 2 {
+                0 => observation_of(steps, usize::from(place / 2), camera, packed.id),
+                _ => own.next().copied(),
+            };
+            let observations = observations.by_ref().take(packed.count as usize).filter_map(observation).collect();
+            (packed.id, Feature { observations, landmark: packed.landmark })
+        };
+        self.features.iter().map(&mut feature).collect()
+    }
+
+    fn bytes(&self) -> usize {
+        size_of::<Self>()
+            + self.features.capacity() * size_of::<PackedFeature>()
+            + self.observations.capacity() * size_of::<u16>()
+            + self.own.capacity() * size_of::<FeatureObservation>()
+    }
+}
+
+/// Observation of a feature in the step of the frame at `slot`, `None` without one.
+fn observation_of(
+    steps: &[Option<&dyn StepMeasurements>],
+    slot: usize,
+    camera: usize,
+    id: FeatureId,
+) -> Option<FeatureObservation> {
+    let features = (*steps.get(slot)?)?.features(camera);
+    let place = features.binary_search_by_key(&id, |feature| feature.id).ok()?;
+    let feature = &features[place];
+    Some(FeatureObservation { slot, uv_px: feature.uv_px, bearing: feature.bearing })
+}
+
+/// [`Prior`] that stores of each column of the Jacobian only the entries down to the last nonzero one: the Jacobian is
+/// nearly triangular.
+#[derive(Clone, Debug)]
+struct PackedPrior {
+    columns: Vec<PriorColumn>,
+    /// Number of stored entries of each column.
+    heights: Vec<u16>,
+    entries: Vec<f64>,
+    residual: DVector<f64>,
+}
+
+impl PackedPrior {
+    fn new(prior: &Prior) -> Self {
+        let height = |column: &[f64]| column.iter().rposition(|entry| entry.to_bits() != 0).map_or(0, |last| last + 1);
+        let jacobian = prior.jacobian();
+        let columns = || jacobian.as_slice().chunks_exact(jacobian.nrows().max(1));
+        let heights: Vec<u16> = columns().map(|column| height(column) as u16).collect();
+        let mut entries = Vec::with_capacity(heights.iter().map(|height| usize::from(*height)).sum());
+        for (column, height) in columns().zip(&heights) {
+            entries.extend_from_slice(&column[..usize::from(*height)]);
+        }
+        Self { columns: prior.columns().to_vec(), heights, entries, residual: prior.offset().clone() }
+    }
+
+    fn unpacked(&self) -> Prior {
+        let mut jacobian = DMatrix::zeros(self.residual.len(), self.heights.len());
+        let mut entries = &self.entries[..];
+        for (mut column, height) in jacobian.column_iter_mut().zip(&self.heights) {
+            let (own, rest) = entries.split_at(usize::from(*height));
+            column.as_mut_slice()[..own.len()].copy_from_slice(own);
+            entries = rest;
+        }
+        Prior::new(self.columns.clone(), jacobian, self.residual.clone())
+    }
+
+    fn heap_bytes(&self) -> usize {
+        self.columns.capacity() * size_of::<PriorColumn>()
+            + self.heights.capacity() * size_of::<u16>()
+            + (self.entries.capacity() + self.residual.len()) * size_of::<f64>()
+    }
 }
