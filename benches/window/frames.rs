@@ -128,7 +128,7 @@ pub(crate) fn measure(recording: &Recording, player: &mut Player) -> Table {
     let played = &stamps_ns[stamps_ns.len().saturating_sub(PLAYED)..];
     let Some(first_ns) = played.first().copied() else { return table };
     for preset in Preset::all() {
-        player.state.arrange(preset);
+        player.state.tiles.arrange(preset);
         for _ in 0..SETTLING {
             player.picture(recording, first_ns);
         }

@@ -185,9 +185,9 @@ pub fn panel_csv(
     let (selection, commands, playback, theme) = (&mut selection, &mut Vec::new(), &playback, &theme);
     let presentation = options.presentation;
     let ctx = &mut PanelContext { recording, cursor_ns, playback, images, selection, theme, presentation, commands };
-    let mut window = MainWindow::default();
-    options.open_motion(&mut window.panels);
-    Ok(panel_table(panel, &mut window, ctx))
+    let mut panels = Panels::default();
+    options.open_motion(&mut panels);
+    Ok(panel_table(panel, &mut panels, ctx))
 }
 
 /// Passes the panel's user interface to a function that draws it.
@@ -206,7 +206,7 @@ fn with_panel<T>(
     check(options)?;
     let theme = Theme::of(options.theme);
     let mut window = MainWindow::default();
-    window.arrange(options.layout);
+    window.tiles.arrange(options.layout);
     options.open_motion(&mut window.panels);
     let panels = RefCell::new(Panels::default());
     panels.borrow_mut().comparison.view = options.view;

@@ -5,6 +5,7 @@ use egui::{Align2, Color32, FontFamily, FontId, Painter, Pos2, Rect, Shape, Stro
 
 use crate::gui::plot::{ValueAxis, ValuePlot, paint_between, paint_ground};
 use crate::gui::theme::{CURVE_WIDTH, Theme, label_font};
+use crate::gui::widgets::plated_text;
 use crate::log_check::{AllanReport, NoiseTerm, SensorNoise};
 
 /// Space above a plot for the result, in points.
@@ -122,16 +123,10 @@ fn sensor_ui(painter: &Painter, theme: &Theme, sensor: &SensorNoise, rect: Rect)
         let at = axes.at(tau_s, value);
         inside.circle_filled(at, MARKER, theme.text_strong);
         inside.circle_stroke(at, MARKER, Stroke::new(1.5, theme.plot_background));
-        label(&inside, theme, at + vec2(0.0, -9.0), &letter.to_string());
+        let galley = inside.layout_no_wrap(letter.to_string(), font(14.0), theme.text_strong);
+        let plate = (theme.plot_background.gamma_multiply(0.8), vec2(3.0, 0.0));
+        plated_text(&inside, at + vec2(0.0, -9.0), Align2::CENTER_BOTTOM, (galley, theme.text_strong), plate);
     }
-}
-
-/// A label over the curves.
-fn label(painter: &Painter, theme: &Theme, at: Pos2, text: &str) {
-    let galley = painter.layout_no_wrap(text.to_owned(), font(14.0), theme.text_strong);
-    let rect = Align2::CENTER_BOTTOM.anchor_size(at, galley.size());
-    painter.rect_filled(rect.expand2(vec2(3.0, 0.0)), 2.0, theme.plot_background.gamma_multiply(0.8));
-    painter.galley(rect.min, galley, theme.text_strong);
 }
 
 /// The slopes on which white noise and random walk are read.

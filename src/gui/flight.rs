@@ -7,7 +7,7 @@ use egui::Context;
 use super::follow::Follower;
 use super::step_work::{REPAINT, StepWork};
 use crate::gimbal::ParameterId;
-use crate::gui::convergence::names::place_of;
+use crate::gui::parameter_names::place_of;
 use crate::gui::step_advice::step_advice;
 use crate::observability::Determination;
 use crate::observability::laboratory::Advice;

@@ -1,6 +1,5 @@
 //! Panels, the 3D scene and the window: they read a recording at a cursor and push commands.
 
-mod accessible;
 pub mod allan;
 pub mod app;
 pub mod breakpoints;
@@ -24,6 +23,7 @@ mod pan_zoom;
 mod panel;
 #[cfg(test)]
 mod panel_tests;
+mod parameter_names;
 mod path_field;
 pub(crate) mod plot;
 pub mod rank;
@@ -44,6 +44,7 @@ pub mod theme;
 pub mod timeline;
 mod under_pointer;
 mod units;
+mod widgets;
 pub mod window;
 
 pub use panel::{CsvTable, Dialog, ImageSource, Panel, PanelContext, PanelName, Playback, Presentation, Selection};

@@ -140,7 +140,7 @@ fn the_window_is_drawn_in_every_case() {
     check("window-small", [1366, 768], |state: &mut MainWindow, ui, ctx| window_ui(ui, state, ctx));
     for preset in [Preset::Calibration, Preset::FrontEnd, Preset::Scene] {
         let mut state = MainWindow::default();
-        state.arrange(preset);
+        state.tiles.arrange(preset);
         let (recording, selection) = (sample_recording(), Selection::default());
         let name = format!("window-{preset:?}");
         screenshot(&name, &recording, 5 * SECOND_NS, [1920, 1080], ThemeName::Dark, &selection, |ui, ctx| {

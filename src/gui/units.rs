@@ -81,6 +81,12 @@ pub(crate) fn seconds(stamp_ns: i64) -> String {
     fixed(crate::geometry::seconds_from_ns(stamp_ns), 3)
 }
 
+/// A text that begins with a capital letter.
+pub(crate) fn capitalized(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
 /// An amount of memory in binary units.
 pub(crate) fn bytes(count: u64) -> String {
     let mebibytes = count as f64 / (1 << 20) as f64;

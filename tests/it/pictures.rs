@@ -131,7 +131,7 @@ impl Subject {
                 let (mut state, mut selection) = (MainWindow::default(), Selection::default());
                 match self {
                     Self::Dialog(dialog) => state.dialogs.show(dialog),
-                    _ => state.shortcuts_open = true,
+                    _ => state.dialogs.shortcuts_open = true,
                 }
                 let theme = Theme::of(options.theme);
                 let mut headless = Headless::new(options);

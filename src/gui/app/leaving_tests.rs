@@ -110,7 +110,7 @@ fn the_layout_is_kept_and_restored() {
     let kept = desktop.window.lock().unwrap().clone().expect("it is stored");
     assert!(kept.contains("\"preset\":\"Scene\"") && kept.contains("\"size\""), "{kept}");
     let again = App::new(sample_opener(), desktop as Arc<dyn Desktop>, ThemeName::Dark);
-    assert!(again.state.last_layout_value() == harness.state().state.last_layout_value());
+    assert!(again.state.tiles.last_layout_value() == harness.state().state.tiles.last_layout_value());
 }
 
 #[test]

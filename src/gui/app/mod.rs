@@ -109,15 +109,15 @@ impl App {
     /// Creates a window without a log; `theme` is used until the user chooses another one.
     pub fn new(open_log: OpenLog, desktop: Arc<dyn Desktop>, theme: ThemeName) -> Self {
         let mut state = MainWindow::default();
-        state.show_times = true;
+        state.status.show_times = true;
         state.panels.laboratory.in_background = true;
         state.panels.rank.in_background = true;
         state.dialogs.set_desktop(Arc::clone(&desktop));
-        state.saved_layouts = SavedLayouts::from_text(&desktop.kept_layouts().unwrap_or_default());
+        state.tiles.saved = SavedLayouts::from_text(&desktop.kept_layouts().unwrap_or_default());
         state.settings = Settings::from_text(&desktop.kept_settings().unwrap_or_default(), theme);
         let kept = KeptWindow::from_text(&desktop.kept_window().unwrap_or_default());
-        state.arrange_for_start(kept.layout.as_ref());
-        state.recent_logs = desktop.recent_logs();
+        state.tiles.arrange_for_start(kept.layout.as_ref(), &state.settings.layout);
+        state.status.recent_logs = desktop.recent_logs();
         let theme = Theme::of(state.settings.theme);
         Self {
             welcome: Welcome::new(Arc::clone(&desktop)),
@@ -151,7 +151,7 @@ impl App {
     /// Shows an open session. `path` is the opened path if it differs from the log's (a saved session).
     pub fn show(&mut self, log: Box<dyn PlayingLog>, path: Option<&Path>) {
         self.desktop.remember_log(path.unwrap_or(&log.recording().log_path));
-        self.state.recent_logs = self.desktop.recent_logs();
+        self.state.status.recent_logs = self.desktop.recent_logs();
         self.study = None;
         self.show_session(log);
     }
@@ -162,7 +162,7 @@ impl App {
         log.apply(Command::SetMemoryBudget(self.state.settings.memory_bytes()));
         log.apply(Command::SetSpeed(PlaybackSpeed(self.state.settings.speed)));
         if let Some(layout) = log.layout() {
-            self.state.take_layout(layout);
+            self.state.tiles.take_layout(layout);
         }
         self.departure.saved = Work::of(log.as_ref());
         self.state.begin_session(&log.playback().markers);
@@ -275,9 +275,9 @@ impl App {
         }
         self.opening_cursor.update(log.as_mut(), now_s);
         let (recording, playback, generation) = (log.recording(), log.playback(), log.generation());
-        self.state.progress = self.progress.read(&recording, Some(now_s));
-        self.state.opening = self.opening.as_ref().map(Opening::text);
-        self.state.study = self.study.as_ref().map(ShownStudy::name);
+        self.state.status.progress = self.progress.read(&recording, Some(now_s));
+        self.state.status.opening = self.opening.as_ref().map(Opening::text);
+        self.state.status.study = self.study.as_ref().map(ShownStudy::name);
         self.state.panels.timeline.pace.frame(playback.playing, now_s, log.cursor_ns());
         let mut commands = Vec::new();
         self.selection.flight.compute_in_background();
@@ -318,7 +318,7 @@ impl App {
         let now_s = ui.input(|input| input.time);
         if self.memory_read_s.is_none_or(|read_s| now_s - read_s >= MEMORY_PERIOD_S) {
             self.memory_read_s = Some(now_s);
-            self.state.memory_bytes = self.desktop.resident_bytes();
+            self.state.status.memory_bytes = self.desktop.resident_bytes();
         }
     }
 
@@ -347,7 +347,7 @@ impl App {
             self.opening = None;
         }
         self.state.help.welcome_ui(ui, &self.theme);
-        self.state.focus_ring_ui(ui, &self.theme);
+        self.state.ring.ui(ui, &self.theme);
         self.state.notices.toasts_ui(ui, &self.theme);
         if let Some(choice) = chosen.inner {
             self.take_choice(choice);
@@ -369,7 +369,7 @@ impl App {
     /// Starts the tour on the log that is open or being opened, else on the sample flight.
     pub fn start_tour(&mut self) {
         if self.log.is_some() {
-            self.state.start_tour();
+            self.state.tour.start();
         } else if let Some(opening) = &self.opening {
             self.tour_of = Some(opening.path());
         } else if let Some(choice) = self.welcome.sample(true) {
@@ -399,7 +399,7 @@ impl App {
         let size = ui.viewport_rect().size();
         let (mut place, now_s) = (self.keeper.kept.place, ui.input(|input| input.time));
         ui.input(|input| place.read(input.viewport(), vec2(size.x, size.y), scale));
-        if place != self.keeper.kept.place || self.state.take_layout_changed() {
+        if place != self.keeper.kept.place || self.state.tiles.take_changed() {
             self.keeper.kept.place = place;
             self.keeper.changed_s.get_or_insert(now_s);
         }
@@ -415,7 +415,7 @@ impl App {
         if self.keeper.changed_s.take().is_none() {
             return;
         }
-        self.keeper.kept.layout = self.state.last_layout_value();
+        self.keeper.kept.layout = self.state.tiles.last_layout_value();
         if let Err(problem) = self.desktop.keep_window(&self.keeper.kept.to_text()) {
             self.state.notices.show_message(NoticeLevel::Error, problem);
         }

@@ -49,14 +49,14 @@ impl App {
                     Opened::Log(opened) => {
                         self.show(opened.log, Some(&opened.remembered));
                         for notice in opened.notices {
-                            self.state.notices.show_message(NoticeLevel::Info, notice);
+                            self.state.notices.inform(notice);
                         }
                     }
                     Opened::Study(study) => self.show_study(study, path.clone()),
                     Opened::RunOfStudy(log) => self.show_session(log),
                 }
                 if self.tour_of.take().is_some_and(|of| of == path) {
-                    self.state.start_tour();
+                    self.state.tour.start();
                 }
             }
             // The page of a missing rig stays, for another choice.

@@ -6,7 +6,6 @@ use std::time::Duration;
 use egui::Ui;
 
 use super::App;
-use crate::gui::window::NoticeLevel;
 
 /// Period at which the window looks for the finished report.
 const POLL_PERIOD: Duration = Duration::from_millis(250);
@@ -16,7 +15,6 @@ impl App {
     pub(super) fn start_report(&mut self) {
         let Some(log) = &self.log else { return };
         let recording = log.recording();
-        let name = recording.log_path.file_stem().map_or_else(|| "log".into(), |stem| stem.to_string_lossy());
         let mut arguments = vec![recording.log_path.display().to_string()];
         let (forks, runs): (Vec<_>, Vec<_>) = recording.runs.iter().partition(|run| run.origin.is_some());
         for run in runs {
@@ -28,13 +26,11 @@ impl App {
             count => format!(" without the {count} forks"),
         };
         let text = format!("Writing the report{without}; it opens when it is complete");
-        match self.desktop.start_report(&name, &arguments) {
-            Ok(report) => {
-                self.report = Some(report);
-                self.state.notices.show_message(NoticeLevel::Info, text);
-            }
-            Err(problem) => self.state.notices.show_message(NoticeLevel::Error, problem),
-        }
+        let started = self.desktop.start_report(&recording.log_stem(), &arguments);
+        self.state.notices.report(started.map(|report| {
+            self.report = Some(report);
+            text
+        }));
     }
 
     /// Reports the result of a report that is being written.
@@ -49,11 +45,7 @@ impl App {
             Err(TryRecvError::Disconnected) => Err("dcvins report stopped".to_owned()),
         };
         self.report = None;
-        match result {
-            Ok(path) => {
-                self.state.notices.show_message(NoticeLevel::Info, format!("Report written:\n{}", path.display()));
-            }
-            Err(problem) => self.state.notices.show_message(NoticeLevel::Error, format!("No report: {problem}")),
-        }
+        let written = result.map(|path| format!("Report written:\n{}", path.display()));
+        self.state.notices.report(written.map_err(|problem| format!("No report: {problem}")));
     }
 }

@@ -41,15 +41,13 @@ impl App {
 
     /// Writes the session to its file; returns true on success.
     pub(super) fn save_session(&mut self) -> bool {
-        let layout = self.state.layout_value();
+        let layout = self.state.tiles.layout_value();
         let Some(log) = &self.log else { return false };
-        let stem = log.recording().log_path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
         let Some(text) = log.saved(layout) else { return false };
-        match self.desktop.write_session(&stem.unwrap_or_else(|| "log".to_owned()), &text) {
+        match self.desktop.write_session(&log.recording().log_stem(), &text) {
             Ok(path) => {
                 self.departure.saved = Work::of(log.as_ref());
-                let text = format!("Session saved (opens like a log):\n{}", path.display());
-                self.state.notices.show_message(NoticeLevel::Info, text);
+                self.state.notices.inform(format!("Session saved (opens like a log):\n{}", path.display()));
                 true
             }
             Err(problem) => {
@@ -71,28 +69,19 @@ impl App {
                 format!("Motion opened:\n{}", path.display())
             }),
         };
-        match done {
-            Ok(text) => self.state.notices.show_message(NoticeLevel::Info, text),
-            Err(problem) => self.state.notices.show_message(NoticeLevel::Error, problem),
-        }
+        self.state.notices.report(done);
     }
 
     fn write_figure(&mut self, export: &FigureExport) {
-        match self.desktop.write_figure(export) {
-            Ok(path) => {
-                self.state.notices.show_message(NoticeLevel::Info, format!("Figure saved:\n{}", path.display()));
-            }
-            Err(problem) => self.state.notices.show_message(NoticeLevel::Error, problem),
-        }
+        let written = self.desktop.write_figure(export);
+        self.state.notices.report(written.map(|path| format!("Figure saved:\n{}", path.display())));
     }
 
     fn write_panel(&mut self, export: &PanelExport) {
-        match self.desktop.write_panel(export) {
-            Ok(paths) => {
-                let paths: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
-                self.state.notices.show_message(NoticeLevel::Info, format!("Exported:\n{}", paths.join("\n")));
-            }
-            Err(problem) => self.state.notices.show_message(NoticeLevel::Error, problem),
-        }
+        let written = self.desktop.write_panel(export).map(|paths| {
+            let paths: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
+            format!("Exported:\n{}", paths.join("\n"))
+        });
+        self.state.notices.report(written);
     }
 }

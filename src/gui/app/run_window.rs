@@ -10,7 +10,7 @@ use super::kept_window::{KeptWindow, move_inside_screen};
 use super::software_window::SoftwareWindow;
 use crate::gui::app::{App, OpenLog, OpenRequest, OpenStudy, PlayingLog};
 use crate::gui::desktop::Desktop;
-use crate::gui::scene::SceneBackend;
+use crate::gui::rendering::scene_backend::SceneBackend;
 use crate::gui::theme::ThemeName;
 
 /// Packages for the window on a server without a desktop (Debian and Ubuntu).

@@ -28,7 +28,7 @@ impl App {
             Ok(state) => {
                 self.close_session();
                 self.desktop.remember_log(&path);
-                self.state.recent_logs = self.desktop.recent_logs();
+                self.state.status.recent_logs = self.desktop.recent_logs();
                 self.welcome.stop();
                 self.study = Some(ShownStudy { source, state, path });
             }
@@ -50,7 +50,7 @@ impl App {
         study_ui(ui, &mut study.state, &self.theme);
         let requests = std::mem::take(&mut study.state.requests);
         self.state.help.welcome_ui(ui, &self.theme);
-        self.state.focus_ring_ui(ui, &self.theme);
+        self.state.ring.ui(ui, &self.theme);
         self.state.notices.toasts_ui(ui, &self.theme);
         for request in requests {
             ui.ctx().request_repaint();
@@ -58,7 +58,7 @@ impl App {
                 StudyRequest::OpenRun(row) => self.open_run(row),
                 StudyRequest::Copy(text, what) => {
                     ui.copy_text(text);
-                    self.state.notices.show_message(NoticeLevel::Info, format!("Copied the table of {what} (CSV)"));
+                    self.state.notices.inform(format!("Copied the table of {what} (CSV)"));
                 }
                 StudyRequest::Close => self.study = None,
             }
@@ -73,7 +73,7 @@ impl App {
         let rows = comparable_rows(&table.runs, row, MAX_RUNS);
         let title = table.title_of(row);
         let source = Arc::clone(&study.source);
-        self.state.notices.show_message(NoticeLevel::Info, format!("Opening {title}"));
+        self.state.notices.inform(format!("Opening {title}"));
         let request = OpenRequest::of(PathBuf::from(title));
         self.open_on_thread(request, move |_| {
             source.open_runs(&rows).map(Opened::RunOfStudy).map_err(OpenFailure::Problem)

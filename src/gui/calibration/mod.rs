@@ -9,8 +9,8 @@ mod tests;
 use egui::{RichText, TextEdit, Ui};
 
 use self::order::Order;
-use super::convergence::empty_ui;
 use super::flight::FlightReport;
+use super::widgets::empty_ui;
 use super::{Panel, PanelContext};
 use crate::geometry::seconds_from_ns;
 use crate::gui::units::fixed;

@@ -2,7 +2,7 @@
 
 use std::cmp::{Ordering, Reverse};
 
-use crate::gui::convergence::names::place_of;
+use crate::gui::parameter_names::place_of;
 use crate::observability::Determination;
 use crate::session::FlightParameter;
 

@@ -6,8 +6,8 @@ use egui::{Align2, Color32, FontId, Galley, Role, ScrollArea, Sense, Stroke, Str
 
 use super::order::{Order, SortColumn};
 use crate::gui::PanelContext;
-use crate::gui::convergence::names::meaning_of;
 use crate::gui::determination::look_of;
+use crate::gui::parameter_names::meaning_of;
 use crate::gui::theme::{Theme, label_font, number_font};
 use crate::gui::under_pointer::{Item, offer, offer_item};
 use crate::gui::units::{Shown, fixed};

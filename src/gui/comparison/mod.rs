@@ -14,7 +14,7 @@ mod single;
 mod tests;
 
 use egui::containers::scroll_area::ScrollAreaOutput;
-use egui::{ComboBox, Rect, RichText, ScrollArea, Ui, UiBuilder, Vec2, vec2};
+use egui::{Rect, RichText, ScrollArea, Ui, UiBuilder, Vec2, vec2};
 
 use self::errors::Errors;
 pub(in crate::gui) use self::numbers::POSES_ONLY;
@@ -22,9 +22,9 @@ use self::over_time::OverTime;
 use self::scores::Scores;
 use self::side_by_side::{Scenes, SideBySideImages};
 use self::single::Single;
-use super::convergence::empty_ui;
 use super::rank;
 use super::theme::PANEL_MARGIN;
+use super::widgets::{choice_ui, empty_ui};
 use super::{Dialog, Panel, PanelContext};
 use crate::session::Comparison;
 use crate::text::Named;
@@ -168,19 +168,16 @@ impl ComparisonPanel {
             return view;
         }
         ui.horizontal_wrapped(|ui| {
-            let name = ui.label(RichText::new("Reference").color(ctx.theme.text_weak));
-            let label = |run: usize| ctx.recording.runs.get(run).map_or("", |run| run.spec.label.as_str());
+            let name = RichText::new("Reference").color(ctx.theme.text_weak);
+            let label =
+                |run: &usize| ctx.recording.runs.get(*run).map_or_else(String::new, |run| run.spec.label.clone());
             if ctx.presentation.is_figure() {
-                ui.label(RichText::new(label(self.reference)).color(ctx.theme.run(self.reference).color));
+                ui.label(name);
+                ui.label(RichText::new(label(&self.reference)).color(ctx.theme.run(self.reference).color));
                 return;
             }
-            let combo = ComboBox::from_id_salt("reference run").width(110.0).selected_text(label(self.reference));
-            let shown = combo.show_ui(ui, |ui| {
-                for run in 0..ctx.recording.runs.len() {
-                    ui.selectable_value(&mut self.reference, run, label(run));
-                }
-            });
-            shown.response.labelled_by(name.id).on_hover_text("Reference run of all differences");
+            choice_ui(ui, name, 110.0, &mut self.reference, 0..ctx.recording.runs.len(), label)
+                .on_hover_text("Reference run of all differences");
             ui.separator();
             for choice in ComparisonView::all() {
                 let [name, hover] = choice.label();

@@ -5,6 +5,7 @@ use egui::{Align2, Rect, Role, Ui, WidgetInfo, pos2};
 use crate::gimbal::{ParameterGroup, ParameterId};
 use crate::gui::PanelContext;
 use crate::gui::theme;
+use crate::gui::units::capitalized;
 use crate::text::Named as _;
 
 /// Content of the panel.
@@ -35,11 +36,6 @@ pub(super) fn choice_ui(ui: &mut Ui, view: &mut ConvergenceView, groups: &[(Para
                 .on_hover_text("This group fills the panel");
         }
     });
-}
-
-fn capitalized(name: &str) -> String {
-    let mut letters = name.chars();
-    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
 /// Draws the heading of a group; a click folds the group.

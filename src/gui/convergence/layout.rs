@@ -2,8 +2,8 @@
 
 use egui::{Rect, pos2, vec2};
 
-use super::names::{CalibrationPart, part_of};
 use crate::gimbal::{ParameterGroup, ParameterId};
+use crate::gui::parameter_names::{CalibrationPart, part_of};
 use crate::gui::plot::{TICKS_ONLY, TIME_GUTTER};
 
 /// Minimum height of a legible plot in points, including its title.

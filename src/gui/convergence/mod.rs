@@ -4,7 +4,6 @@ mod csv;
 mod groups;
 mod layout;
 mod model;
-pub(crate) mod names;
 mod paint;
 mod range;
 #[cfg(test)]
@@ -18,7 +17,9 @@ use self::groups::{ConvergenceView, groups_of};
 use self::model::{CalibrationHistory, ConvertedHistory};
 use self::paint::ParameterCurves;
 use super::chain_values::{ParameterValues, true_values};
+use super::parameter_names::part_of;
 use super::plot::Wheel;
+use super::widgets::empty_ui;
 use super::{Panel, PanelContext};
 use crate::gimbal::{ParameterGroup, ParameterId};
 
@@ -66,7 +67,7 @@ impl Panel for ConvergencePanel {
             empty_ui(ui, &format!("Calibration fixed in run {label}"));
             return;
         }
-        parameters.sort_by_key(|parameter| names::part_of(*parameter));
+        parameters.sort_by_key(|parameter| part_of(*parameter));
         self.read_converted(ctx, shown);
         let ground_truth = true_values(ctx.recording, &ctx.recording.runs[shown], ctx.cursor_ns).unwrap_or_default();
 
@@ -194,9 +195,4 @@ fn prior_ui(ui: &mut Ui, ctx: &PanelContext<'_>) -> bool {
         prior.folder.display()
     ));
     true
-}
-
-/// Shows the reason why a panel has no content.
-pub(crate) fn empty_ui(ui: &mut Ui, why: &str) {
-    ui.centered_and_justified(|ui| ui.label(RichText::new(why).weak()));
 }

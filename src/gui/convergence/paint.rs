@@ -6,13 +6,13 @@ use std::collections::BTreeMap;
 use egui::{Align2, Color32, Painter, Pos2, Rangef, Rect, Stroke, StrokeKind, Ui, pos2, vec2};
 
 use super::model::{CalibrationHistory, ConvertedHistory, ParameterCurve};
-use super::names::{CalibrationPart, heading_of, meaning_of};
 use super::range::{paint_outside, value_range};
 use crate::gimbal::{ParameterId, Parameterization};
 use crate::gui::PanelContext;
 use crate::gui::chain_values::ParameterValues;
 use crate::gui::determination::look_of;
 use crate::gui::help::terms::window;
+use crate::gui::parameter_names::{CalibrationPart, heading_of, meaning_of};
 use crate::gui::plot::{
     BandCurve, Clicks, Curve, Interaction, PlotArea, ReadLine, Readout, StateCurve, Wheel, is_named_within, paint_band,
     paint_curve, paint_ground, paint_hatch, paint_line, paint_time_axis, paint_value_axis, plot_ui, value_range_of,
@@ -21,6 +21,7 @@ use crate::gui::plot::{
 use crate::gui::theme::{self, CURVE_WIDTH, Theme};
 use crate::gui::under_pointer::{Item, offer, offer_item};
 use crate::gui::units::{Shown, fixed};
+use crate::gui::widgets::plated_text;
 use crate::observability::Determination;
 use crate::text::Named as _;
 
@@ -419,9 +420,7 @@ fn fixed_value(shown: Shown, value: f64, sigma: f64) -> String {
 /// Draws a text with a background, legible over curves.
 fn boxed_text(painter: &Painter, theme: &Theme, place: Pos2, align: Align2, text: &str, color: Color32) {
     let galley = painter.layout_no_wrap(text.to_owned(), theme::label_font(), color);
-    let rect = align.anchor_size(place, galley.size());
-    painter.rect_filled(rect.expand2(vec2(2.0, 0.0)), 2.0, theme.plot_background);
-    painter.galley(rect.min, galley, color);
+    plated_text(painter, place, align, (galley, color), (theme.plot_background, vec2(2.0, 0.0)));
 }
 
 /// The cached curves of one parameter of one run.

@@ -1,11 +1,12 @@
 //! The documents in a separate window.
 
-use egui::{Align, Button, ComboBox, Key, Modifiers, RichText, ScrollArea, Ui, WidgetInfo, vec2};
+use egui::{Align, Button, Key, Modifiers, RichText, ScrollArea, Ui, WidgetInfo, vec2};
 
 use super::blocks_ui::block_ui;
 use super::documents::{DocumentId, LinkTarget};
 use super::markdown::{MarkdownBlock, StyledText};
 use crate::gui::theme::Theme;
+use crate::gui::widgets::choice_ui;
 
 /// Frames in which the section is scrolled into view: the first ones lay out the window and the scroll area.
 const FRAMES_TO_SECTION: u8 = 3;
@@ -104,15 +105,9 @@ impl Manual {
             {
                 (self.place, self.frames_to_section) = (place, FRAMES_TO_SECTION);
             }
-            let name = ui.label(RichText::new("Document").color(theme.text_weak));
+            let name = RichText::new("Document").color(theme.text_weak);
             let mut document = self.place.document;
-            let combo = ComboBox::from_id_salt("document").width(240.0).selected_text(document.title());
-            let shown = combo.show_ui(ui, |ui| {
-                for choice in DocumentId::all() {
-                    ui.selectable_value(&mut document, choice, choice.title());
-                }
-            });
-            shown.response.labelled_by(name.id);
+            choice_ui(ui, name, 240.0, &mut document, DocumentId::all(), |document| document.title().to_owned());
             if document != self.place.document {
                 self.go(Place { document, anchor: None });
             }

@@ -15,12 +15,11 @@ use egui::{Align2, ColorImage, PopupCloseBehavior, Rect, Sense, TextureHandle, T
 use self::model::ImageModel;
 pub use self::model::SolveSide;
 use self::paint::{ImagePlacement, MarkOptions};
-use super::accessible::describe;
-use super::convergence::empty_ui;
 use super::help::terms::window;
 use super::pan_zoom::PanZoom;
 use super::under_pointer::{Item, offer, offer_item};
 use super::units::significant;
+use super::widgets::{describe, empty_ui};
 use super::{Panel, PanelContext};
 use crate::sensors::{GrayImage, ImageMask};
 use crate::session::FrameImage;

@@ -5,6 +5,7 @@ use nalgebra::Vector2;
 
 use super::model::{FeatureMark, SolveSide};
 use crate::gui::theme::{self, Theme, ThemeName};
+use crate::gui::widgets::plated_text;
 use crate::sensors::ImageMask;
 
 /// Period of the hatch over masked pixels, in image pixels.
@@ -175,10 +176,7 @@ pub(super) fn selection(painter: &Painter, place: &ImagePlacement, at: Pos2) {
 /// Draws a text on the image with a dark background; returns its rectangle.
 pub(super) fn label(painter: &Painter, at: Pos2, align: Align2, text: &str) -> Rect {
     let galley = painter.layout_no_wrap(text.to_owned(), theme::label_font(), ink().text_strong);
-    let rect = align.anchor_size(at, galley.size());
-    painter.rect_filled(rect.expand2(vec2(2.0, 0.0)), 2.0, HALO);
-    painter.galley(rect.min, galley, ink().text_strong);
-    rect
+    plated_text(painter, at, align, (galley, ink().text_strong), (HALO, vec2(2.0, 0.0)))
 }
 
 /// Draws the legend of the marks in one line; entries that do not fit are omitted from the right.

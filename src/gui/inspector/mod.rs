@@ -12,8 +12,8 @@ use std::sync::Arc;
 use egui::{CollapsingHeader, RichText, ScrollArea, Ui, vec2};
 
 use self::links::Links;
-use super::convergence::empty_ui;
 use super::theme::Theme;
+use super::widgets::empty_ui;
 use super::{Panel, PanelContext};
 use crate::session::{RunRecord, StepRecord};
 

@@ -17,11 +17,10 @@ use egui::{Pos2, Rect, Role, Sense, Ui, Vec2, WidgetInfo, vec2};
 
 use self::model::JacobianModel;
 pub(super) use self::model::{cameras, column_name, name_of};
-use super::accessible::describe;
-use super::convergence::empty_ui;
 use super::help::terms::window;
 use super::pan_zoom::PanZoom;
 use super::under_pointer::{Item, offer, offer_item};
+use super::widgets::{describe, empty_ui};
 use super::{Panel, PanelContext};
 use crate::estimator::{ColumnId, JacobianFactor};
 use crate::session::{RunRecord, StepRecord};

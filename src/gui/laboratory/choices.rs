@@ -1,14 +1,15 @@
 //! The choices that define an experiment.
 
-use egui::{ComboBox, Ui};
+use egui::Ui;
 
 use super::worker::LaboratoryJob;
 use crate::estimator::{JointKnowledge, PoseKnowledge};
 use crate::gimbal::Parameterization;
 use crate::gui::PanelContext;
 use crate::gui::help::terms::window;
+use crate::gui::widgets::{choice_ui, hinted_choice_ui};
 use crate::observability::laboratory::{LABORATORY_IMU, LaboratoryForm, LaboratoryMotion, LaboratorySetup, Mechanism};
-use crate::text::Named as _;
+use crate::text::Named;
 
 /// Knowledge of the joint angles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,11 +19,24 @@ enum Joints {
     Unknown,
 }
 
+impl Named for Joints {
+    const NAMES: &'static [(Self, &'static str)] =
+        &[(Self::Known, "known"), (Self::Encoder, "encoders"), (Self::Unknown, "no encoders")];
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Poses {
     Known,
     Inertial,
     InertialBiasKnown,
+}
+
+impl Named for Poses {
+    const NAMES: &'static [(Self, &'static str)] = &[
+        (Self::Known, "known"),
+        (Self::Inertial, "from the IMU"),
+        (Self::InertialBiasKnown, "from the IMU, biases known"),
+    ];
 }
 
 #[derive(Clone, Debug)]
@@ -93,59 +107,31 @@ impl Choices {
 
     fn mechanism_ui(&mut self, ui: &mut Ui, ctx: &PanelContext<'_>) {
         let rig = format!("rig {}", ctx.recording.rig.name);
-        let name = ui.label("Mechanism");
-        let text = self.mechanism.map_or_else(|| rig.clone(), str::to_owned);
-        let shown = ComboBox::from_id_salt("mechanism").width(150.0).selected_text(text).show_ui(ui, |ui| {
-            ui.selectable_value(&mut self.mechanism, None, rig);
-            for (known, meaning) in Mechanism::NAMES {
-                ui.selectable_value(&mut self.mechanism, Some(known), known).on_hover_text(meaning);
-            }
-        });
-        shown.response.labelled_by(name.id).on_hover_text(window::MECHANISM.meaning);
+        let text = |name: &Option<&'static str>| name.map_or_else(|| rig.clone(), str::to_owned);
+        let meaning = |name: &Option<&'static str>| {
+            Mechanism::NAMES.iter().find(|(known, _)| Some(*known) == *name).map_or("", |(_, meaning)| meaning)
+        };
+        let names = std::iter::once(None).chain(Mechanism::NAMES.iter().map(|(name, _)| Some(*name)));
+        hinted_choice_ui(ui, "Mechanism", 150.0, &mut self.mechanism, names, text, meaning)
+            .on_hover_text(window::MECHANISM.meaning);
     }
 
     fn motion_ui(&mut self, ui: &mut Ui) {
-        let name = ui.label("Motion");
-        let combo = ComboBox::from_id_salt("motion").width(150.0).selected_text(self.motion.name());
-        let shown = combo.show_ui(ui, |ui| {
-            for motion in LaboratoryMotion::all() {
-                ui.selectable_value(&mut self.motion, motion, motion.name()).on_hover_text(motion.meaning());
-            }
-        });
-        shown.response.labelled_by(name.id).on_hover_text(window::MOTION.meaning);
+        let (motions, text) = (LaboratoryMotion::all(), |motion: &LaboratoryMotion| motion.name().to_owned());
+        hinted_choice_ui(ui, "Motion", 150.0, &mut self.motion, motions, text, |motion| motion.meaning())
+            .on_hover_text(window::MOTION.meaning);
     }
 
     fn knowledge_ui(&mut self, ui: &mut Ui) {
-        let name = ui.label("Joint angles");
-        let words = |joints: Joints| match joints {
-            Joints::Known => "known",
-            Joints::Encoder => "encoders",
-            Joints::Unknown => "no encoders",
-        };
-        let combo = ComboBox::from_id_salt("joint angles").width(80.0).selected_text(words(self.joints));
-        let shown = combo.show_ui(ui, |ui| {
-            for joints in [Joints::Known, Joints::Encoder, Joints::Unknown] {
-                ui.selectable_value(&mut self.joints, joints, words(joints));
-            }
-        });
-        shown.response.labelled_by(name.id).on_hover_text(window::JOINT_ANGLES.meaning);
+        let name_of = |joints: &Joints| joints.name().to_owned();
+        let angles = choice_ui(ui, "Joint angles", 80.0, &mut self.joints, Joints::all(), name_of)
+            .on_hover_text(window::JOINT_ANGLES.meaning);
         if self.joints == Joints::Encoder {
             let sigma = egui::DragValue::new(&mut self.encoder_sigma_deg).range(1e-3..=45.0).speed(0.01).suffix("°");
-            ui.add(sigma).labelled_by(name.id).on_hover_text(window::JOINT_ANGLES.meaning);
+            ui.add(sigma).labelled_by(angles.id).on_hover_text(window::JOINT_ANGLES.meaning);
         }
-        let name = ui.label("Poses");
-        let words = |poses: Poses| match poses {
-            Poses::Known => "known",
-            Poses::Inertial => "from the IMU",
-            Poses::InertialBiasKnown => "from the IMU, biases known",
-        };
-        let combo = ComboBox::from_id_salt("poses").width(110.0).selected_text(words(self.poses));
-        let shown = combo.show_ui(ui, |ui| {
-            for poses in [Poses::Known, Poses::Inertial, Poses::InertialBiasKnown] {
-                ui.selectable_value(&mut self.poses, poses, words(poses));
-            }
-        });
-        shown.response.labelled_by(name.id).on_hover_text(window::POSES.meaning);
+        choice_ui(ui, "Poses", 110.0, &mut self.poses, Poses::all(), |poses| poses.name().to_owned())
+            .on_hover_text(window::POSES.meaning);
     }
 
     fn mechanism(&self, ctx: &PanelContext<'_>) -> Option<Mechanism> {

@@ -4,7 +4,7 @@ use egui::{Id, PointerButton, Rangef, Rect, Response, Role, Sense, Stroke, Ui, W
 
 use super::area::PlotArea;
 use crate::gui::PanelContext;
-use crate::gui::accessible::describe;
+use crate::gui::widgets::describe;
 use crate::session::Command;
 
 /// Minimum visible time range.

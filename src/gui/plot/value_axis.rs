@@ -5,8 +5,8 @@ use egui::{Align2, Rect, Role, Sense, Ui, WidgetInfo, pos2};
 use super::area::PlotArea;
 use super::navigate::{Interaction, Wheel};
 use crate::gui::PanelContext;
-use crate::gui::accessible::describe;
 use crate::gui::theme::label_font;
+use crate::gui::widgets::describe;
 
 /// Width in points of the strip to the left of a plot that reacts to the pointer.
 const AXIS_WIDTH: f32 = 38.0;

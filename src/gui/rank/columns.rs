@@ -8,7 +8,7 @@ use super::heat_map::paint_weight;
 use super::{groups, spectrum};
 use crate::gimbal::{ParameterId, ParameterNames};
 use crate::gui::PanelContext;
-use crate::gui::convergence::names::{meaning_of, part_of};
+use crate::gui::parameter_names::{meaning_of, part_of};
 use crate::gui::theme::{self, Theme};
 use crate::gui::under_pointer::{Item, offer_item};
 use crate::gui::units::counted;

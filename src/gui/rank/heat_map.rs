@@ -6,11 +6,11 @@ use egui::{Align2, Painter, Rangef, Rect, RichText, Role, Sense, Stroke, StrokeK
 use super::groups;
 use crate::gimbal::ParameterId;
 use crate::gui::PanelContext;
-use crate::gui::accessible::describe;
-use crate::gui::convergence::names::{meaning_of, part_of};
+use crate::gui::parameter_names::{meaning_of, part_of};
 use crate::gui::theme::{self, Theme};
 use crate::gui::under_pointer::{Item, offer_item};
 use crate::gui::units::{counted, fixed, significant};
+use crate::gui::widgets::describe;
 use crate::observability::{CalibrationDirection, RankReport, parameters_of};
 use crate::session::FlightParameter;
 

@@ -7,7 +7,7 @@ use egui::{CollapsingHeader, Color32, Grid, Label, RichText, TextStyle, Ui, vec2
 use crate::estimator::Motion;
 use crate::gimbal::ParameterNames;
 use crate::gui::PanelContext;
-use crate::gui::convergence::names::{meaning_of, part_of};
+use crate::gui::parameter_names::{meaning_of, part_of};
 use crate::gui::theme::{Theme, number_font};
 use crate::gui::under_pointer::{Item, offer_item};
 use crate::gui::units::fixed;

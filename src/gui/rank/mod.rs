@@ -25,7 +25,6 @@ use self::sections::{MIN_HEIGHT_WITH_CAUSE, fact_at_ui, headline_ui, section_ui}
 use self::slider::SliderUi;
 use self::spectrum::ranks_text;
 use self::verdict::{Level, RankVerdict};
-use super::convergence::empty_ui;
 use super::follow::RunTables;
 use super::help::terms::window;
 use super::plot::{
@@ -34,6 +33,7 @@ use super::plot::{
     within_gutters,
 };
 use super::theme::{CURVE_WIDTH, RunStyle, Theme};
+use super::widgets::empty_ui;
 use super::{Panel, PanelContext};
 use crate::gimbal::ParameterNames;
 use crate::observability::RankReport;

@@ -1,12 +1,12 @@
 //! Singular values on a logarithmic axis with both thresholds.
 
-use egui::{Rect, Role, Sense, Stroke, StrokeKind, Ui, WidgetInfo, pos2, vec2};
+use egui::{Align2, Rect, Role, Sense, Stroke, StrokeKind, Ui, WidgetInfo, pos2, vec2};
 
 use crate::gimbal::ParameterNames;
-use crate::gui::accessible::describe;
 use crate::gui::plot::{GridLine, ValueAxis, ValuePlot, paint_ground};
 use crate::gui::theme::{Theme, label_font};
 use crate::gui::units::significant;
+use crate::gui::widgets::{describe, plated_text};
 use crate::observability::{RankReport, parameters_of};
 
 /// Draws the spectrum in `height` points.
@@ -88,10 +88,8 @@ fn threshold(painter: &egui::Painter, theme: &Theme, plot: Rect, y: f32, name: &
     let points = [pos2(plot.left(), y), pos2(plot.right(), y)];
     painter.extend(egui::Shape::dashed_line(&points, Stroke::new(1.0, theme.text_strong), 4.0, 3.0));
     let galley = painter.layout_no_wrap(name.to_owned(), label_font(), theme.text_strong);
-    let place = pos2(plot.right() - galley.size().x - 2.0, y - galley.size().y);
-    let ground = Rect::from_min_size(place, galley.size()).expand2(vec2(2.0, -1.0));
-    painter.rect_filled(ground, 2.0, theme.plot_background.gamma_multiply(0.8));
-    painter.galley(place, galley, theme.text_strong);
+    let plate = (theme.plot_background.gamma_multiply(0.8), vec2(2.0, -1.0));
+    plated_text(painter, pos2(plot.right() - 2.0, y), Align2::RIGHT_BOTTOM, (galley, theme.text_strong), plate);
 }
 
 /// Logarithmic axis that contains the spectra of all reports.

@@ -13,7 +13,7 @@ use thiserror::Error;
 
 use super::chunks::Chunk;
 use super::headless::{FramePainter, Headless, HeadlessOptions};
-use crate::gui::scene::SceneBackend;
+use crate::gui::rendering::scene_backend::SceneBackend;
 
 /// Format of the target: eight bits per channel in gamma space, in which egui blends.
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;

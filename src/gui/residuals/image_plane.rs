@@ -7,7 +7,6 @@ use nalgebra::Vector2;
 
 use super::histogram::round_up;
 use crate::gui::PanelContext;
-use crate::gui::accessible::describe;
 use crate::gui::help::terms::window;
 use crate::gui::plot::{
     PlotArea, TIME_GUTTER, decimals_of_step, paint_between, paint_ground, paint_hatch, paint_line, paint_value_axis,
@@ -15,6 +14,7 @@ use crate::gui::plot::{
 };
 use crate::gui::theme::{CURVE_WIDTH, RunStyle, Theme, label_font, mix, number_font};
 use crate::gui::units::{counted, fixed};
+use crate::gui::widgets::describe;
 use crate::session::{ImageResiduals, MeanResidual, ResidualSum, RunRecord, StepRecord};
 
 /// Number of columns of the grid over the image.

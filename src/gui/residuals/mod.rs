@@ -13,8 +13,6 @@ use egui::{
 };
 
 use self::image_plane::ImagePlane;
-use super::accessible::describe;
-use super::convergence::empty_ui;
 use super::follow::RunTables;
 use super::help::terms::{Term, factors, window};
 use super::plot::{
@@ -24,6 +22,7 @@ use super::plot::{
 };
 use super::theme::{CURVE_WIDTH, ROW_HEIGHT, Theme, label_font, number_font};
 use super::units::{fixed, significant};
+use super::widgets::{describe, empty_ui};
 use super::{Panel, PanelContext};
 use crate::estimator::{FactorKind, ResidualSummary, StepReport};
 use crate::gui::residuals::histogram::ResidualHistogram;

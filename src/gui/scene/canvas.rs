@@ -2,34 +2,11 @@
 
 use std::sync::Arc;
 
-use egui::{Context, Id, Pos2, Rect, TextureHandle, TextureOptions, Ui, pos2};
+use egui::{Pos2, Rect, TextureHandle, TextureOptions, Ui, pos2};
 
 use super::layout::SceneDrawing;
 use super::{cpu, gpu};
-
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum SceneBackend {
-    /// On the CPU into a texture: for screenshots, and for windows on a CPU adapter.
-    #[default]
-    Cpu,
-    /// With wgpu in egui's paint callback, into targets of this format.
-    Wgpu(wgpu::TextureFormat),
-}
-
-impl SceneBackend {
-    fn key() -> Id {
-        Id::unique("scene back end")
-    }
-
-    /// Sets the backend of a context; the default is the CPU.
-    pub fn set(self, context: &Context) {
-        context.data_mut(|data| data.insert_temp(Self::key(), self));
-    }
-
-    pub fn of(context: &Context) -> Self {
-        context.data(|data| data.get_temp(Self::key())).unwrap_or_default()
-    }
-}
+use crate::gui::rendering::scene_backend::SceneBackend;
 
 /// Keeps the last drawing, so that it is drawn again only when it changes.
 pub(super) struct Canvas {

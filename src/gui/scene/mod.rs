@@ -23,13 +23,12 @@ use nalgebra::Vector3;
 
 use self::camera::{Orbit, OrbitCamera, SceneView, Viewport, frame};
 use self::canvas::Canvas;
-pub use self::canvas::SceneBackend;
 use self::chain::{ChainModel, ChainPose};
 use self::layout::lay_out;
 use self::overlay::LegendLine;
 use self::world::{LaneView, RunView, Trajectories, WorldBuilder, WorldOptions, framing_points_m, ground_height_m};
-use super::accessible::describe;
 use super::help::terms::{Term, window};
+use super::widgets::describe;
 use super::{Panel, PanelContext};
 use crate::camera::CameraModel;
 use crate::sensors::Rig;

@@ -1,13 +1,15 @@
 //! Texts and legends over the scene.
 
-use egui::{Align2, Color32, Galley, Painter, Pos2, Rect, Shape, Stroke, Vec2, pos2, vec2};
+use egui::{Align2, Color32, Galley, Painter, Pos2, Rect, Stroke, Vec2, pos2, vec2};
 use std::sync::Arc;
 
 use super::camera::{SceneView, round_length};
 use super::chain::{ChainModel, axis_colors};
 use super::layout::ScreenLabel;
 use crate::geometry::principal_angle;
+use crate::gui::plot::paint_line;
 use crate::gui::theme::{self, RunStyle, Theme};
+use crate::gui::widgets::plated_text;
 
 /// Height of one line of text.
 pub(super) const LINE_HEIGHT: f32 = 15.0;
@@ -43,9 +45,7 @@ pub(super) fn labels(painter: &Painter, rect: Rect, pixels_per_point: f32, label
 
 /// A text on a translucent background.
 fn plated(painter: &Painter, at: Pos2, galley: Arc<Galley>, color: Color32, ground: Color32) {
-    let plate = Rect::from_min_size(at, galley.size()).expand2(vec2(2.0, -1.0));
-    painter.rect_filled(plate, 2.0, ground.gamma_multiply(0.8));
-    painter.galley(at, galley, color);
+    plated_text(painter, at, Align2::LEFT_TOP, (galley, color), (ground.gamma_multiply(0.8), vec2(2.0, -1.0)));
 }
 
 /// A line of the legend: style and name.
@@ -94,14 +94,7 @@ pub(super) fn legend(
     for (line, text) in lines.iter().zip(&texts) {
         let middle = at.y + 0.5 * LINE_HEIGHT;
         let sample = [pos2(at.x, middle), pos2(at.x + 28.0, middle)];
-        let stroke = Stroke::new(2.0, line.style.color);
-        if line.style.dashes.is_empty() {
-            painter.line_segment(sample, stroke);
-        } else {
-            let (dashes, gaps): (Vec<f32>, Vec<f32>) =
-                line.style.dashes.chunks_exact(2).map(|pair| (pair[0], pair[1])).unzip();
-            painter.extend(Shape::dashed_line_with_offset(&sample, stroke, &dashes, &gaps, 0.0));
-        }
+        paint_line(painter, &sample, line.style, 2.0);
         let galley = painter.layout_no_wrap((*text).to_owned(), theme::label_font(), theme.text);
         plated(painter, at + vec2(34.0, 0.0), galley, theme.text, ground);
         at.y += LINE_HEIGHT;

@@ -9,9 +9,9 @@ use egui::{Align2, Color32, PopupCloseBehavior, Pos2, Rect, Role, Sense, Shape, 
 
 use super::context::StudyContext;
 use super::parallel_axes::{AxisScale, ParallelAxis, default_axes, parallel_axis};
-use crate::gui::accessible::describe;
 use crate::gui::theme::{Theme, ThemeName, label_font, number_font, viridis};
 use crate::gui::units::significant;
+use crate::gui::widgets::describe;
 use crate::study::view::Study;
 
 /// Distance in points within which the pointer hits a line.

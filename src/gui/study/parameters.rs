@@ -4,10 +4,10 @@ use egui::{Align2, Rect, RichText, Role, ScrollArea, Sense, Stroke, Ui, WidgetIn
 
 use super::context::StudyContext;
 use super::points::Points;
-use crate::gui::accessible::describe;
 use crate::gui::plot::{GridLine, ValueAxis, ValuePlot};
 use crate::gui::theme::{ThemeName, label_font};
 use crate::gui::units::{fixed, significant};
+use crate::gui::widgets::describe;
 use crate::study::view::{ParameterErrors, SigmaVerdict, Study, parameter_errors};
 
 /// Headings of the table with their definitions.

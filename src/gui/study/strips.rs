@@ -4,10 +4,10 @@ use egui::{Align2, Painter, Pos2, Rect, Role, ScrollArea, Sense, Stroke, Ui, Wid
 
 use super::context::StudyContext;
 use super::points::Points;
-use crate::gui::accessible::describe;
 use crate::gui::plot::ValueAxis;
 use crate::gui::theme::{Theme, label_font, number_font};
 use crate::gui::units::significant;
+use crate::gui::widgets::describe;
 use crate::study::view::Spread;
 
 /// Minimum and maximum height of a strip in points.

@@ -14,6 +14,7 @@ use crate::gui::plot::{
 };
 use crate::gui::theme::{self, RunStyle, Theme};
 use crate::gui::units::fixed;
+use crate::gui::widgets::plated_text;
 use crate::sensors::{NEAREST_POSE_NS, PoseTrack};
 
 /// Maximum height of the bar of a run in points.
@@ -121,10 +122,9 @@ pub(super) fn run(painter: &Painter, theme: &Theme, area: &PlotArea, lanes: &Run
         paint_hatch(painter, rect, style.color.gamma_multiply(0.5));
         if rect.width() > 70.0 {
             let galley = painter.layout_no_wrap("initializing".to_owned(), theme::label_font(), theme.text_strong);
-            let place = rect.left_center() + vec2(4.0, -galley.size().y / 2.0);
-            let ground = Rect::from_min_size(place, galley.size()).expand2(vec2(2.0, -1.0));
-            painter.rect_filled(ground, 2.0, theme.plot_background.gamma_multiply(0.85));
-            painter.galley(place, galley, theme.text_strong);
+            let plate = (theme.plot_background.gamma_multiply(0.85), vec2(2.0, -1.0));
+            let at = rect.left_center() + vec2(4.0, 0.0);
+            plated_text(painter, at, Align2::LEFT_CENTER, (galley, theme.text_strong), plate);
         }
     }
     for segment in visible_segments(area, &lanes.stamps_ns, |row| lanes.tracking[row]) {

@@ -26,6 +26,7 @@ use super::plot::{
 use super::theme::{LANE_HEIGHT, LANE_LABEL_WIDTH, Theme, number_font};
 use super::under_pointer::{Item, offer, offer_item};
 use super::units::{fixed, seconds};
+use super::widgets::plated_text;
 use super::{Panel, PanelContext, ReadingCursor};
 use crate::geometry::{ns_from_seconds, seconds_from_ns};
 use crate::session::Command;
@@ -363,8 +364,7 @@ fn paint_interval(painter: &egui::Painter, ctx: &PanelContext<'_>, area: &PlotAr
     let inside = galley.size().x + 90.0 < (b - a).abs();
     let left = if inside { 0.5 * (a + b - galley.size().x) } else { a.max(b) + 40.0 };
     let place = pos2(left.min(area.rect.right() - galley.size().x), area.rect.top());
-    painter.rect_filled(Rect::from_min_size(place, galley.size()).expand2(vec2(8.0, 0.0)), 2.0, ctx.theme.surface);
-    painter.galley(place, galley, ctx.theme.accent);
+    plated_text(painter, place, Align2::LEFT_TOP, (galley, ctx.theme.accent), (ctx.theme.surface, vec2(8.0, 0.0)));
 }
 
 /// Seconds along the upper edge, with a grid line through the lanes for each.

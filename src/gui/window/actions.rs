@@ -92,6 +92,7 @@ pub(crate) enum Action {
     RemoveRun(usize),
     Show(PanelName),
     Hide(PanelName),
+    Focus(PanelName),
     /// Set the speed of playback in log seconds per second.
     Speed(f64),
     /// Play at the next higher (`true`) or lower speed.

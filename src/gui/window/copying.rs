@@ -3,11 +3,10 @@
 use egui::epaint::TextShape;
 use egui::{LayerId, Pos2, Shape, Ui};
 
-use super::notices::NoticeLevel;
-use super::state::MainWindow;
+use super::notices::Notices;
+use crate::gui::PanelName;
 use crate::gui::under_pointer::offered;
 use crate::gui::units::counted;
-use crate::gui::{PanelContext, PanelName};
 
 /// Number of letters of a copied value that its notice shows.
 const SHOWN_LETTERS: usize = 60;
@@ -35,34 +34,23 @@ fn text_at(ui: &Ui, layer: LayerId, position: Pos2) -> Option<String> {
     })
 }
 
-/// Copies the value under the pointer, or else the table of the panel with the focus.
-pub(super) fn copy(value: Option<String>, state: &mut MainWindow, ctx: &PanelContext<'_>) {
-    match value {
-        Some(value) => copy_value(value, state),
-        None => copy_table(state.focused().0, state, ctx),
-    }
-}
-
-pub(super) fn copy_value(value: String, state: &mut MainWindow) {
+pub(super) fn copy_value(ui: &Ui, notices: &mut Notices, value: String) {
     let mut shown: String =
         value.chars().take(SHOWN_LETTERS).map(|letter| if letter == '\n' { ' ' } else { letter }).collect();
     if value.chars().count() > SHOWN_LETTERS {
         shown.push('…');
     }
-    state.notices.show_message(NoticeLevel::Info, format!("Copied: {shown}"));
-    state.copied = Some(value);
+    notices.inform(format!("Copied: {shown}"));
+    ui.copy_text(value);
 }
 
-/// Copies the values of a panel as comma-separated values.
-pub(super) fn copy_table(panel: PanelName, state: &mut MainWindow, ctx: &PanelContext<'_>) {
-    let table = state.panels.csv_table(panel, ctx);
+/// Copies the values of a panel, given as comma-separated values.
+pub(super) fn copy_table(ui: &Ui, notices: &mut Notices, panel: PanelName, table: String) {
     let rows = table.lines().count().saturating_sub(1);
     if rows == 0 {
-        let text = format!("{}: no values to copy at the cursor", panel.title());
-        state.notices.show_message(NoticeLevel::Info, text);
+        notices.inform(format!("{}: no values to copy at the cursor", panel.title()));
         return;
     }
-    let text = format!("Copied the table of {}: {} (CSV)", panel.title(), counted(rows, "row"));
-    state.notices.show_message(NoticeLevel::Info, text);
-    state.copied = Some(table);
+    notices.inform(format!("Copied the table of {}: {} (CSV)", panel.title(), counted(rows, "row")));
+    ui.copy_text(table);
 }

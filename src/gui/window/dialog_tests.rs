@@ -51,7 +51,7 @@ fn a_run_is_removed_after_a_question_and_undo_does_not_skip_it() {
 fn a_breakpoint_on_an_unknown_parameter_is_refused() {
     let mut harness = bench();
     let state = harness.state_mut();
-    state.window.layout.set_visible(PanelName::Breakpoints, true);
+    state.window.tiles.layout.set_visible(PanelName::Breakpoints, true);
     harness.run_steps(3);
     type_text(&mut harness, "Condition", "sigma(pitch.q) > 0");
     assert!(harness.get_by_label("Add breakpoint").accesskit_node().is_disabled());
@@ -60,7 +60,7 @@ fn a_breakpoint_on_an_unknown_parameter_is_refused() {
     assert!(pushed.is_empty(), "{pushed:?}");
     // Enter has left the field; a known name that no run estimates is accepted with a note.
     let mut harness = bench();
-    harness.state_mut().window.layout.set_visible(PanelName::Breakpoints, true);
+    harness.state_mut().window.tiles.layout.set_visible(PanelName::Breakpoints, true);
     harness.run_steps(3);
     type_text(&mut harness, "Condition", "sigma(k1) > 0");
     assert!(!harness.get_by_label("Add breakpoint").accesskit_node().is_disabled());
@@ -82,7 +82,7 @@ fn a_fork_with_a_misspelt_parameter_stays_open() {
 #[test]
 fn a_figure_of_the_focused_panel_is_composed_and_saved() {
     let mut harness = bench();
-    harness.state_mut().window.focus = Some(PanelName::Residuals);
+    harness.state_mut().window.tiles.focus = Some(PanelName::Residuals);
     harness.state_mut().selection.visible_ns = Some((1_000_000_000, 3_000_000_000));
     harness.run_steps(2);
     harness.key_press_modifiers(Modifiers::COMMAND | Modifiers::SHIFT, Key::E);

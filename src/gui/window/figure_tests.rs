@@ -6,7 +6,7 @@ use egui::Role;
 use egui_kittest::Harness;
 use egui_kittest::kittest::{By, NodeT as _, Queryable as _};
 
-use super::{MainWindow, alone_ui};
+use super::{MainWindow, Panels, alone_ui};
 use crate::gimbal::tests::parameter;
 use crate::gui::desktop::PanelExport;
 use crate::gui::samples::{sample_images, sample_recording_of};
@@ -120,8 +120,6 @@ fn exported(panel: PanelName) -> PanelExport {
     let recording = sample_recording_of(80, &["auto", "classical"]);
     let theme = Theme::of(ThemeName::Light);
     let (playback, mut commands, mut selection) = (Playback::default(), Vec::new(), Selection::default());
-    let mut state = MainWindow { focus: Some(panel), ..MainWindow::default() };
-    state.places.push((panel, egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(700.0, 400.0))));
     let mut context = PanelContext {
         recording: &recording,
         cursor_ns: recording.last_stamp_ns(),
@@ -132,5 +130,5 @@ fn exported(panel: PanelName) -> PanelExport {
         presentation: Presentation::Interactive,
         commands: &mut commands,
     };
-    super::panel_export::export(&state, &mut context)
+    super::panel_export::export(&Panels::default(), (panel, egui::vec2(700.0, 400.0)), &mut context)
 }

@@ -18,7 +18,7 @@ const SMALL: [f32; 2] = [1366.0, 768.0];
 
 /// Asserts that texts are whole and legible. Names of positions in the scene move with the view and are exempt.
 fn check_texts(harness: &Harness<'static, Bench>, what: &str) {
-    let scene = harness.state().window.places.iter().find(|(panel, _)| *panel == PanelName::Scene);
+    let scene = harness.state().window.tiles.places.iter().find(|(panel, _)| *panel == PanelName::Scene);
     let scene = scene.map_or(Rect::NOTHING, |(_, rect)| *rect);
     let mut texts = painted_texts(harness);
     texts.retain(|painted| {
@@ -51,7 +51,7 @@ fn a_small_screen_shows_whole_texts_in_every_layout() {
     for count in [1, 2] {
         for preset in Preset::all() {
             let mut harness = bench_of(runs(count), SMALL);
-            harness.state_mut().window.arrange(preset);
+            harness.state_mut().window.tiles.arrange(preset);
             harness.run_steps(4);
             check_texts(&harness, &format!("{} with {count} runs", preset.name()));
         }
@@ -62,7 +62,7 @@ fn a_small_screen_shows_whole_texts_in_every_layout() {
 fn a_small_screen_shows_whole_texts_in_every_panel() {
     for panel in PanelName::movable() {
         let mut harness = bench_of(runs(2), SMALL);
-        harness.state_mut().window.layout.set_visible(panel, true);
+        harness.state_mut().window.tiles.layout.set_visible(panel, true);
         harness.run_steps(4);
         check_texts(&harness, panel.title());
     }
@@ -73,11 +73,12 @@ fn the_heat_map_is_above_the_fold_in_every_layout() {
     for (count, run) in [(1, 0), (2, 0), (2, 1)] {
         for preset in Preset::all() {
             let mut harness = bench_of(runs(count), SMALL);
-            harness.state_mut().window.arrange(preset);
+            harness.state_mut().window.tiles.arrange(preset);
             harness.state_mut().selection.run = run;
             harness.run_steps(4);
             let what = format!("{}, run {run} of {count}", preset.name());
-            let panel = harness.state().window.places.iter().find(|(panel, _)| *panel == PanelName::Rank).unwrap().1;
+            let panel =
+                harness.state().window.tiles.places.iter().find(|(panel, _)| *panel == PanelName::Rank).unwrap().1;
             for answers in [
                 ["Whole flight: ", "Flight to "],
                 ["Structural rank 18 of", "Full rank"],
@@ -127,7 +128,7 @@ fn a_large_window_shows_the_convergence_plots_beside_the_calibration_table() {
     let both = |size: [f32; 2]| {
         let harness = bench_of(sample(), size);
         let place = |panel: PanelName| {
-            harness.state().window.places.iter().find(|(known, _)| *known == panel).map(|(_, rect)| *rect)
+            harness.state().window.tiles.places.iter().find(|(known, _)| *known == panel).map(|(_, rect)| *rect)
         };
         Some((place(PanelName::Calibration)?, place(PanelName::Convergence)?))
     };

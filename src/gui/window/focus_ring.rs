@@ -11,7 +11,7 @@ const MIN_LINE_LENGTH: f32 = 40.0;
 
 /// State of keyboard navigation.
 #[derive(Debug, Default)]
-pub(super) struct FocusRing {
+pub(in crate::gui) struct FocusRing {
     by_key: bool,
     /// True if the focus moves backwards.
     backward: bool,
@@ -19,7 +19,7 @@ pub(super) struct FocusRing {
 
 impl FocusRing {
     /// Draws the ring; no ring while the pointer moves the focus.
-    pub(super) fn ui(&mut self, ui: &Ui, theme: &Theme) {
+    pub(in crate::gui) fn ui(&mut self, ui: &Ui, theme: &Theme) {
         self.read_keys(ui);
         let widgets = focusable(ui);
         for line in widgets.iter().filter(|widget| is_line(widget)) {

@@ -42,11 +42,11 @@ fn the_palette_goes_to_times_and_frames_and_selects() {
     choose(&mut harness, "theme print");
     assert_eq!(harness.state().window.settings.theme, ThemeName::Print);
     choose(&mut harness, "hide residuals");
-    assert!(!harness.state().window.layout.is_visible(PanelName::Residuals));
+    assert!(!harness.state().window.tiles.layout.is_visible(PanelName::Residuals));
     choose(&mut harness, "show residuals");
-    assert!(harness.state().window.layout.is_visible(PanelName::Residuals));
+    assert!(harness.state().window.tiles.layout.is_visible(PanelName::Residuals));
     choose(&mut harness, "compar layout");
-    assert_eq!(harness.state().window.layout.preset, Some(Preset::Comparison));
+    assert_eq!(harness.state().window.tiles.layout.preset, Some(Preset::Comparison));
 }
 
 #[test]
@@ -134,7 +134,7 @@ fn keys_typed_at_once_go_to_the_palette_and_not_to_the_shortcuts() {
     harness.event(egui::Event::Text("4".to_owned()));
     harness.key_press(Key::Num4);
     harness.run_steps(3);
-    assert_eq!(harness.state().window.layout.preset, Some(Preset::Overview));
+    assert_eq!(harness.state().window.tiles.layout.preset, Some(Preset::Overview));
     assert!(harness.query_by_label("Go to 4.000 s").is_some() || harness.query_by_label_contains("frame 4").is_some());
     harness.key_press(Key::Escape);
     harness.run_steps(3);
@@ -145,28 +145,28 @@ fn keys_typed_at_once_go_to_the_palette_and_not_to_the_shortcuts() {
         harness.key_press(Key::Num4);
         harness.key_press(Key::B);
     });
-    assert!(pushed.is_empty() && harness.state().window.layout.preset == Some(Preset::Overview), "{pushed:?}");
+    assert!(pushed.is_empty() && harness.state().window.tiles.layout.preset == Some(Preset::Overview), "{pushed:?}");
     harness.key_press(Key::Escape);
     harness.run_steps(3);
     harness.key_press(Key::Num4);
     harness.run_steps(3);
-    assert_eq!(harness.state().window.layout.preset, Some(Preset::Scene));
+    assert_eq!(harness.state().window.tiles.layout.preset, Some(Preset::Scene));
 }
 
 #[test]
 fn panels_get_the_focus_by_key_in_the_order_on_the_screen() {
     let mut harness = bench();
     let mut seen = Vec::new();
-    for _ in 0..harness.state().window.places.len() {
+    for _ in 0..harness.state().window.tiles.places.len() {
         harness.key_press(Key::F6);
         harness.run_steps(2);
-        seen.push(harness.state().window.focus.unwrap());
+        seen.push(harness.state().window.tiles.focus.unwrap());
     }
     assert_eq!(seen.first(), Some(&PanelName::Image));
     assert_eq!(seen.last(), Some(&PanelName::Timeline));
     harness.key_press_modifiers(Modifiers::SHIFT, Key::F6);
     harness.run_steps(2);
-    assert_eq!(harness.state().window.focus, seen.iter().rev().nth(1).copied());
+    assert_eq!(harness.state().window.tiles.focus, seen.iter().rev().nth(1).copied());
     // A saved layout by key, and the notice if there is none.
     harness.key_press_modifiers(Modifiers::COMMAND, Key::Num3);
     harness.run_steps(3);
@@ -207,7 +207,7 @@ fn everything_that_can_be_used_has_a_name() {
     }
     harness.key_press(Key::Num1);
     for panel in PanelName::movable() {
-        harness.state_mut().window.layout.set_visible(panel, true);
+        harness.state_mut().window.tiles.layout.set_visible(panel, true);
         harness.run_steps(4);
         check(&harness, panel.title());
     }
@@ -290,7 +290,7 @@ fn painted_elements_have_a_role_and_say_their_content() {
         (PanelName::Jacobian, "Jacobian blocks", "columns of blocks"),
         (PanelName::Comparison, "Difference in position over time", "classical"),
     ] {
-        harness.state_mut().window.layout.set_visible(panel, true);
+        harness.state_mut().window.tiles.layout.set_visible(panel, true);
         harness.run_steps(4);
         let text = content(&harness, name, Role::Image);
         assert!(text.contains(part), "{name}: {text}");
@@ -314,7 +314,7 @@ fn painted_elements_have_a_role_and_say_their_content() {
 #[test]
 fn tab_goes_in_reading_order_and_not_to_lines() {
     let mut harness = bench();
-    let places = harness.state().window.places.clone();
+    let places = harness.state().window.tiles.places.clone();
     let region = |rect: egui::Rect| {
         let inside = places.iter().position(|(_, place)| place.expand(1.0).contains(rect.center()));
         // The tabs are above their panel.

@@ -6,6 +6,7 @@ use egui::containers::menu::{MenuButton, MenuConfig};
 use egui::{Button, PopupCloseBehavior, Ui, WidgetInfo};
 
 use super::actions::{Action, Entry, SECOND_NS, TABLE, TENTH_NS};
+use super::panel_tiles::PanelTiles;
 use super::request::WindowRequest;
 use super::state::MainWindow;
 use super::tiles::Preset;
@@ -149,7 +150,7 @@ fn entry_ui(ui: &mut Ui, state: &MainWindow, ctx: &PanelContext<'_>, entry: &Ent
     }
     let room = ctx.recording.runs.len() < MAX_RUNS;
     let enabled = room || !matches!(entry.action, Action::Dialog(Dialog::AddRun | Dialog::Fork));
-    let on = matches!(entry.action, Action::Layout(preset) if state.layout.preset == Some(preset))
+    let on = matches!(entry.action, Action::Layout(preset) if state.tiles.layout.preset == Some(preset))
         || entry.action == Action::EventLines && state.settings.event_lines;
     if item_ui(ui, entry.name, entry.keys, enabled, on) {
         actions.push(entry.action);
@@ -166,9 +167,9 @@ fn item_ui(ui: &mut Ui, name: &str, keys: &str, enabled: bool, on: bool) -> bool
 fn first_group_ui(ui: &mut Ui, menu: Menu, state: &mut MainWindow, ctx: &PanelContext<'_>, actions: &mut Vec<Action>) {
     match menu {
         Menu::File => {
-            ui.add_enabled_ui(!state.recent_logs.is_empty(), |ui| {
+            ui.add_enabled_ui(!state.status.recent_logs.is_empty(), |ui| {
                 ui.menu_button("Open recent", |ui| {
-                    for path in state.recent_logs.iter().take(MAX_RECENT) {
+                    for path in state.status.recent_logs.iter().take(MAX_RECENT) {
                         if recent_ui(ui, path) {
                             state.requests.push(WindowRequest::OpenLog(vec![path.clone()]));
                         }
@@ -177,7 +178,7 @@ fn first_group_ui(ui: &mut Ui, menu: Menu, state: &mut MainWindow, ctx: &PanelCo
             });
         }
         Menu::View => {
-            for (number, name) in state.saved_layouts.names().enumerate() {
+            for (number, name) in state.tiles.saved.names().enumerate() {
                 let keys = if number < 9 { format!("Ctrl+{}", number + 1) } else { String::new() };
                 if item_ui(ui, &format!("Layout: {name}"), &keys, true, false) {
                     actions.push(Action::SavedLayout(number));
@@ -235,14 +236,15 @@ fn panels_ui(ui: &mut Ui, state: &mut MainWindow, ctx: &PanelContext<'_>) {
     let button = Button::new("Panels").frame_when_inactive(false);
     MenuButton::from_button(button).config(config).ui(ui, |ui| {
         for panel in PanelName::movable() {
-            let mut visible = state.layout.is_visible(panel);
+            let mut visible = state.tiles.layout.is_visible(panel);
             if ui.checkbox(&mut visible, panel.title()).changed() {
-                state.layout.set_visible(panel, visible);
+                state.tiles.layout.set_visible(panel, visible);
             }
         }
         ui.separator();
-        if state.saved_layouts.ui(ui, ctx.theme, &mut state.layout) {
-            state.requests.push(WindowRequest::KeepLayouts(state.saved_layouts.to_text()));
+        let PanelTiles { saved, layout, .. } = &mut state.tiles;
+        if saved.ui(ui, ctx.theme, layout) {
+            state.requests.push(WindowRequest::KeepLayouts(saved.to_text()));
         }
     });
 }

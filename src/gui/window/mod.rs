@@ -21,6 +21,7 @@ mod legend;
 mod menu;
 mod notices;
 mod panel_export;
+mod panel_tiles;
 mod panels;
 mod perform;
 #[cfg(test)]
@@ -46,6 +47,8 @@ use std::sync::Arc;
 use egui::{CentralPanel, Frame, Margin, Rect, Ui, UiBuilder, vec2};
 
 use self::actions::Action;
+use self::context_menu::MenuParts;
+use self::dialogs::DialogParts;
 pub(in crate::gui) use self::dialogs::Modal;
 pub use self::dialogs::state::Dialogs;
 pub(crate) use self::figure::complete;
@@ -56,6 +59,7 @@ pub use self::figure::{
 pub use self::legend::RunLegend;
 pub use self::notices::{NoticeLevel, Notices};
 pub use self::panel_export::panel_table;
+pub use self::panel_tiles::PanelTiles;
 pub use self::panels::Panels;
 use self::perform::perform;
 pub use self::progress::{Progress, ProgressMeter};
@@ -64,6 +68,7 @@ pub use self::saved_layouts::SavedLayouts;
 pub(in crate::gui) use self::settings::first_scale;
 pub use self::settings::{SCALES, Settings};
 pub use self::state::MainWindow;
+pub use self::status_bar::AppStatus;
 pub use self::tiles::Preset;
 use self::tiles::TabClicks;
 use super::help;
@@ -78,15 +83,17 @@ pub fn window_ui(ui: &mut Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>
     let theme = *ctx.theme;
     ctx.move_chain();
     read_pointer(ui, state, ctx);
-    tour::keys(ui, state);
+    if !state.dialogs.is_open() {
+        tour::keys(ui, &mut state.tour);
+    }
     // Shortcuts have no effect while a dialog is open.
     let mut actions: Vec<Action> = if state.dialogs.is_open() { Vec::new() } else { actions::pressed(ui) };
     // A dialog receives the keys after the one that opens it, even in the same frame.
     if let Some(opening) = actions.iter().copied().find(|action| matches!(action, Action::Dialog(_))) {
         actions.clear();
-        perform(opening, state, ctx);
+        perform(ui, opening, state, ctx);
     }
-    state.panels.inspector.show_times = state.show_times;
+    state.panels.inspector.show_times = state.status.show_times;
 
     let bar = Frame::new().fill(theme.surface).inner_margin(Margin::symmetric(8, 3));
     egui::Panel::top("top bar").exact_size(30.0).frame(bar).show(ui, |ui| top_bar::ui(ui, state, ctx, &mut actions));
@@ -103,15 +110,16 @@ pub fn window_ui(ui: &mut Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>
         0.25
     };
     let wanted = state.panels.timeline.wanted_height(ui, ctx).min(most * (ui.available_height() - STATUS_HEIGHT));
-    let below = state.below_height.unwrap_or(wanted + STATUS_HEIGHT);
+    let below = state.tiles.below_height.unwrap_or(wanted + STATUS_HEIGHT);
     let rest = ui.available_rect_before_wrap();
     let above = rest.with_max_y((rest.bottom() - below).max(rest.top()));
     let mut clicks = TabClicks::default();
-    state.places.clear();
+    state.tiles.places.clear();
     let ground = Frame::new().fill(theme.background).inner_margin(Margin::same(3));
     let mut panels_ui = ui.new_child(UiBuilder::new().max_rect(above));
     CentralPanel::no_frame().frame(ground).show(&mut panels_ui, |ui| {
-        clicks = state.layout.ui(ui, &mut state.panels, ctx, state.focus, &mut state.places);
+        let PanelTiles { layout, focus, places, .. } = &mut state.tiles;
+        clicks = layout.ui(ui, &mut state.panels, ctx, *focus, places);
     });
 
     // The status bar is laid out first, because it is the lowest.
@@ -129,49 +137,47 @@ pub fn window_ui(ui: &mut Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>
         let pressed = ui.scope_builder(place, |ui| help::button_ui(ui, &theme, PanelName::Timeline)).inner;
         clicks.asked = pressed.then_some(PanelName::Timeline).or(clicks.asked);
     });
-    state.places.push((PanelName::Timeline, timeline.response.rect));
-    ui.scope_builder(UiBuilder::new().max_rect(status.inner), |ui| status_bar::ui(ui, state, ctx));
+    state.tiles.places.push((PanelName::Timeline, timeline.response.rect));
+    ui.scope_builder(UiBuilder::new().max_rect(status.inner), |ui| {
+        status_bar::ui(ui, &state.status, ctx, &mut state.notices, &mut state.requests);
+    });
     let below = rest.bottom() - timeline.response.rect.top();
-    if state.below_height.replace(below).is_none_or(|known| known != below) {
+    if state.tiles.below_height.replace(below).is_none_or(|known| known != below) {
         ui.request_repaint();
     }
-    state.follow_focus(ui);
-    state.focus = clicks.focused.or(state.focus);
+    state.tiles.follow_focus(ui);
+    state.tiles.focus = clicks.focused.or(state.tiles.focus);
     if let Some(panel) = clicks.asked {
         state.help.toggle(ui.ctx(), panel);
     }
     actions.extend(state.panels.comparison.asked.take().map(Action::Dialog));
     state.requests.extend(state.panels.laboratory.take_request().map(WindowRequest::Motion));
 
-    dialogs::ui(ui, state, ctx, &mut actions);
-    shortcuts::ui(ui, &theme, &mut state.shortcuts_open);
+    let MainWindow { panels, tiles, settings, history, requests, dialogs, .. } = &mut *state;
+    let parts = DialogParts { panels, tiles, settings, history, requests, actions: &mut actions };
+    dialogs::ui(ui, dialogs, ctx, parts);
+    shortcuts::ui(ui, &theme, &mut state.dialogs.shortcuts_open);
     state.notices.list_ui(ui, ctx);
-    tour::ui(ui, state, ctx);
-    state.help.ui(ui, &theme, &state.places);
+    tour::ui(ui, &mut state.tour, &mut state.tiles, &state.panels.rank, ctx);
+    state.help.ui(ui, &theme, &state.tiles.places);
     state.notices.toasts_ui(ui, &theme);
     state.ring.ui(ui, &theme);
-    context_menu::ui(ui, state, ctx, clicks.menu, &mut actions);
-    if actions.contains(&Action::Copy) {
-        state.pointed = copying::value_under_pointer(ui);
-    }
+    let MainWindow { tiles, notices, dialogs, help, menu, .. } = &mut *state;
+    let parts = MenuParts { tiles, notices, dialogs, help, actions: &mut actions };
+    context_menu::ui(ui, menu, ctx, clicks.menu, parts);
     for action in actions {
-        perform(action, state, ctx);
+        perform(ui, action, state, ctx);
     }
     let settled = !ui.input(|input| input.pointer.any_down());
-    if state.history.follow(&state.settings, &state.layout, &ctx.playback.markers, settled) {
+    if state.history.follow(&state.settings, &state.tiles.layout, &ctx.playback.markers, settled) {
         ui.request_repaint();
-    }
-    if let Some(text) = state.copied.take() {
-        ui.copy_text(text);
     }
 }
 
 /// Finds the plot under the pointer before the panels are drawn, and sets what all plots show.
 fn read_pointer(ui: &Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>) {
-    let pointed = plot_under_pointer(ui);
     let reading = &mut ctx.selection.reading;
-    reading.pointer_ns = pointed.as_ref().map(|(_, stamp_ns)| *stamp_ns);
-    state.pointed_plot = pointed.map(|(plot, _)| plot);
+    reading.pointer_ns = plot_under_pointer(ui).map(|(_, stamp_ns)| stamp_ns);
     reading.events =
         if state.settings.event_lines { state.event_lines.read(&ctx.recording.runs) } else { Arc::default() };
 }

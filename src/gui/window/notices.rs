@@ -70,6 +70,19 @@ impl Notices {
         }
     }
 
+    /// Shows a message that is no problem.
+    pub fn inform(&mut self, text: impl Into<String>) {
+        self.show_message(NoticeLevel::Info, text);
+    }
+
+    /// Shows the message of a success, or the problem.
+    pub fn report(&mut self, result: Result<String, String>) {
+        match result {
+            Ok(text) => self.inform(text),
+            Err(problem) => self.show_message(NoticeLevel::Error, problem),
+        }
+    }
+
     /// Draws the messages above the status bar, where they cover no verdict.
     pub(crate) fn toasts_ui(&mut self, ui: &Ui, theme: &Theme) {
         let now_s = ui.input(|input| input.time);
@@ -175,7 +188,7 @@ mod tests {
         // A frame per second.
         let mut headless = Headless::new(options);
         let mut notices = Notices::default();
-        notices.show_message(NoticeLevel::Info, "copied");
+        notices.inform("copied");
         notices.show_message(NoticeLevel::Error, "failed");
         let mut shown = Vec::new();
         for second in 0..50 {

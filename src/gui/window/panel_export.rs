@@ -5,7 +5,7 @@ use std::cell::RefCell;
 use egui::{Ui, Vec2};
 
 use super::figure::{alone_ui, complete};
-use super::state::MainWindow;
+use super::panels::Panels;
 use crate::geometry::seconds_from_ns;
 use crate::gui::desktop::PanelExport;
 use crate::gui::rendering::{headless, headless::HeadlessOptions};
@@ -20,11 +20,10 @@ const MAX_SIDE_PX: f32 = 8192.0;
 /// Minimum size in points of the screenshot of a panel with a list.
 const MIN_LIST_SIZE: Vec2 = Vec2::new(460.0, 640.0);
 
-/// Draws the panel again without the window around it.
-pub(super) fn export(state: &MainWindow, ctx: &mut PanelContext<'_>) -> PanelExport {
-    let (panel, size) = state.focused();
-    let mut copy = state.panels.views();
-    copy.inspector.show_times = state.show_times;
+/// Draws a panel of a size in points again without the window around it.
+pub(super) fn export(panels: &Panels, (panel, size): (PanelName, Vec2), ctx: &mut PanelContext<'_>) -> PanelExport {
+    let mut copy = panels.views();
+    copy.inspector.show_times = panels.inspector.show_times;
     let copy = RefCell::new(copy);
     // A scrolling list in a low panel is exported completely, up to a limit.
     let min_size = match panel {
@@ -55,13 +54,12 @@ pub(super) fn export(state: &MainWindow, ctx: &mut PanelContext<'_>) -> PanelExp
     let screenshot = headless::draw(options, &mut draw_ui);
     copy.borrow_mut().drop_textures();
     let drawing = headless::svg_of(options, "clip", panel.name(), &mut draw_ui);
-    let log = recording.log_path.file_stem().map_or_else(|| "log".into(), |stem| stem.to_string_lossy().into_owned());
-    let name = format!("{log}/{}-{:.3}s", panel.name(), seconds_from_ns(cursor_ns));
+    let name = format!("{}/{}-{:.3}s", recording.log_stem(), panel.name(), seconds_from_ns(cursor_ns));
     PanelExport { name, screenshot, drawing, table: copy.into_inner().csv_table(panel, ctx) }
 }
 
 /// The values of a panel, comma separated.
-pub fn panel_table(panel: PanelName, state: &mut MainWindow, ctx: &mut PanelContext<'_>) -> String {
+pub fn panel_table(panel: PanelName, panels: &mut Panels, ctx: &mut PanelContext<'_>) -> String {
     ctx.move_chain();
-    state.panels.csv_table(panel, ctx)
+    panels.csv_table(panel, ctx)
 }

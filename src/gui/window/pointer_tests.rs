@@ -135,7 +135,7 @@ fn a_click_on_a_plot_moves_the_cursor_and_a_drag_on_the_timeline_too() {
 }
 
 fn place_of(harness: &Harness<'static, Bench>, panel: PanelName) -> egui::Rect {
-    harness.state().window.places.iter().find(|(known, _)| *known == panel).unwrap().1
+    harness.state().window.tiles.places.iter().find(|(known, _)| *known == panel).unwrap().1
 }
 
 #[test]
@@ -145,7 +145,7 @@ fn tabs_and_their_bars_are_dragged_and_put_back_by_undo() {
     let target = place_of(&harness, PanelName::Rank).center();
     drag(&mut harness, PointerButton::Primary, title, target);
     let shown = |harness: &Harness<'static, Bench>, panel: PanelName| {
-        harness.state().window.places.iter().any(|(known, _)| *known == panel)
+        harness.state().window.tiles.places.iter().any(|(known, _)| *known == panel)
     };
     assert!(
         shown(&harness, PanelName::Residuals),
@@ -167,7 +167,7 @@ fn tabs_and_their_bars_are_dragged_and_put_back_by_undo() {
         (place_of(&harness, PanelName::Calibration), place_of(&harness, PanelName::Inspector));
     let bar = pos2(convergence.right() - 60.0, convergence.top() - 10.0);
     drag(&mut harness, PointerButton::Primary, bar, inspector.center());
-    assert!(place_of(&harness, PanelName::Calibration).left() > 1000.0, "{:?}", harness.state().window.places);
+    assert!(place_of(&harness, PanelName::Calibration).left() > 1000.0, "{:?}", harness.state().window.tiles.places);
     let titles = ["Residuals", "Jacobian", "Laboratory", "Comparison"];
     let on_the_right = |title: &&str| harness.query_all_by_label(title).any(|node| node.rect().left() > 1000.0);
     assert!(titles.iter().all(on_the_right));
@@ -176,7 +176,7 @@ fn tabs_and_their_bars_are_dragged_and_put_back_by_undo() {
 #[test]
 fn settings_and_layout_are_undone_and_redone_by_key() {
     let mut harness = bench();
-    let preset = |harness: &Harness<'static, Bench>| harness.state().window.layout.preset;
+    let preset = |harness: &Harness<'static, Bench>| harness.state().window.tiles.layout.preset;
     let undo = |harness: &mut Harness<'static, Bench>, modifiers: Modifiers| {
         harness.key_press_modifiers(Modifiers::COMMAND | modifiers, Key::Z);
         harness.run_steps(3);
@@ -235,7 +235,7 @@ fn the_value_under_the_pointer_or_the_table_is_copied() {
     let value = copied(&mut harness, |harness| harness.event(Event::Copy)).unwrap();
     assert!(value.contains("tructural rank 18 of 18"), "{value}");
     // Without a value, the table of the focused panel is copied.
-    harness.state_mut().window.focus = Some(PanelName::Rank);
+    harness.state_mut().window.tiles.focus = Some(PanelName::Rank);
     harness.event(Event::PointerGone);
     harness.run_steps(2);
     let table = copied(&mut harness, |harness| harness.event(Event::Copy)).unwrap();
@@ -259,7 +259,7 @@ fn a_tab_focuses_its_panel_and_a_double_click_maximizes_it() {
     };
     let at = tab(&harness, "Scene");
     click(&mut harness, at, PointerButton::Primary);
-    assert_eq!(harness.state().window.focus, Some(PanelName::Scene));
+    assert_eq!(harness.state().window.tiles.focus, Some(PanelName::Scene));
     let double_click = |harness: &mut Harness<'static, Bench>, at: Pos2| {
         harness.event(Event::PointerMoved(at));
         harness.run_steps(4);
@@ -270,12 +270,12 @@ fn a_tab_focuses_its_panel_and_a_double_click_maximizes_it() {
     };
     let at = tab(&harness, "Scene");
     double_click(&mut harness, at);
-    assert_eq!(harness.state().window.layout.maximized(), Some(PanelName::Scene));
-    let shown = |harness: &Harness<'static, Bench>| harness.state().window.places.len();
+    assert_eq!(harness.state().window.tiles.layout.maximized(), Some(PanelName::Scene));
+    let shown = |harness: &Harness<'static, Bench>| harness.state().window.tiles.places.len();
     assert_eq!(shown(&harness), 2, "the panel and the timeline");
     let at = tab(&harness, "Scene");
     double_click(&mut harness, at);
-    assert_eq!(harness.state().window.layout.maximized(), None);
+    assert_eq!(harness.state().window.tiles.layout.maximized(), None);
     assert!(shown(&harness) > 4);
     // By key, and another layout restores the panels.
     for _ in 0..2 {
@@ -290,5 +290,5 @@ fn a_tab_focuses_its_panel_and_a_double_click_maximizes_it() {
     harness.run_steps(3);
     assert!(shown(&harness) > 4);
     // The size of a maximized panel is no change that undo reverts.
-    assert_eq!(harness.state().window.layout.preset, Some(Preset::Calibration));
+    assert_eq!(harness.state().window.tiles.layout.preset, Some(Preset::Calibration));
 }

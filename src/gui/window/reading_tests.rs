@@ -153,7 +153,8 @@ fn the_name_of_a_reading_cursor_does_not_cover_a_verdict() {
     let mut harness = bench_with(PanelName::Convergence);
     let verdicts = |harness: &Harness<'static, Bench>| -> Vec<egui::Rect> {
         let marked = ["weakly determined", "not determined", "⚠", "✖"];
-        let panel = harness.state().window.places.iter().find(|(panel, _)| *panel == PanelName::Convergence).unwrap().1;
+        let panel =
+            harness.state().window.tiles.places.iter().find(|(panel, _)| *panel == PanelName::Convergence).unwrap().1;
         let of = |painted: PaintedText<'_>| {
             (marked.contains(&painted.text()) && panel.contains(painted.rect().center())).then_some(painted.rect())
         };
@@ -180,10 +181,10 @@ fn the_name_of_a_reading_cursor_does_not_cover_a_verdict() {
 fn a_low_residuals_panel_shows_the_values_over_time_without_scrolling() {
     for (size, preset) in [([1366.0, 768.0], Preset::Overview), ([1920.0, 1080.0], Preset::Overview)] {
         let mut harness = bench_of(sample(), size);
-        harness.state_mut().window.layout.arrange(preset);
-        harness.state_mut().window.layout.set_visible(PanelName::Residuals, true);
+        harness.state_mut().window.tiles.layout.arrange(preset);
+        harness.state_mut().window.tiles.layout.set_visible(PanelName::Residuals, true);
         harness.run_steps(4);
-        let places = &harness.state().window.places;
+        let places = &harness.state().window.tiles.places;
         let panel = places.iter().find(|(panel, _)| *panel == PanelName::Residuals).unwrap().1;
         let plot = harness.get_by_label("Reprojection RMS over time").rect();
         assert!(panel.contains_rect(plot) && plot.height() > 30.0, "{size:?}: {plot:?} in {panel:?}");
@@ -202,9 +203,9 @@ fn painted(
     let recording = sample();
     let mut state = MainWindow::default();
     state.settings.event_lines = true;
-    state.arrange(preset);
+    state.tiles.arrange(preset);
     if preset == Preset::Overview {
-        state.layout.set_visible(PanelName::Convergence, true);
+        state.tiles.layout.set_visible(PanelName::Convergence, true);
     }
     let mut ui = |ui: &mut egui::Ui| {
         let mut context = PanelContext {

@@ -5,10 +5,9 @@ use std::collections::BTreeMap;
 use egui::{Button, RichText, TextEdit, Ui};
 use egui_tiles::Tree;
 
-use super::tiles::{PanelLayout, Preset};
+use super::tiles::PanelLayout;
 use crate::gui::PanelName;
 use crate::gui::theme::Theme;
-use crate::text::Named as _;
 
 const MAX_LAYOUTS: usize = 12;
 
@@ -23,7 +22,7 @@ impl SavedLayouts {
     /// Reads the text of [`SavedLayouts::to_text`]; layouts with unknown panels (of a later version) are skipped.
     pub fn from_text(text: &str) -> Self {
         let values: BTreeMap<String, serde_json::Value> = serde_json::from_str(text).unwrap_or_default();
-        let layouts = values.into_iter().filter_map(|(name, value)| Some((name, tree_of(value)?))).collect();
+        let layouts = values.into_iter().filter_map(|(name, value)| Some((name, tree_of_value(value)?))).collect();
         Self { layouts, typed: String::new() }
     }
 
@@ -85,35 +84,8 @@ impl SavedLayouts {
     }
 }
 
-/// The current layout for a saved session.
-pub(super) fn layout_value(layout: &PanelLayout) -> Option<serde_json::Value> {
-    serde_json::to_value(layout.tree()).ok()
-}
-
-/// Applies the layout of a saved session if this program has its panels.
-pub(super) fn take_layout(layout: &mut PanelLayout, value: &serde_json::Value) {
-    if let Some(tree) = tree_of(value.clone()) {
-        layout.take(tree);
-    }
-}
-
-/// The current layout for the next start, with the name of its preset.
-pub(super) fn last_layout_value(layout: &PanelLayout) -> Option<serde_json::Value> {
-    let preset = layout.preset.map(Preset::name);
-    Some(serde_json::json!({ "preset": preset, "panels": layout_value(layout)? }))
-}
-
-/// Applies the value of [`last_layout_value`] if this program has its panels.
-pub(super) fn take_last_layout(layout: &mut PanelLayout, value: &serde_json::Value) {
-    if let Some(panels) = value.get("panels") {
-        take_layout(layout, panels);
-        let preset = value.get("preset").and_then(serde_json::Value::as_str).and_then(Preset::from_name);
-        layout.preset = layout.preset.or(preset);
-    }
-}
-
 /// A layout with at least one panel. Panels that are missing in it can be added.
-fn tree_of(value: serde_json::Value) -> Option<Tree<PanelName>> {
+pub(super) fn tree_of_value(value: serde_json::Value) -> Option<Tree<PanelName>> {
     let tree: Tree<PanelName> = serde_json::from_value(value).ok()?;
     let shows = tree.root().is_some() && PanelName::movable().any(|panel| tree.tiles.find_pane(&panel).is_some());
     shows.then_some(tree)
@@ -122,6 +94,7 @@ fn tree_of(value: serde_json::Value) -> Option<Tree<PanelName>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gui::window::tiles::Preset;
 
     #[test]
     fn layouts_survive_writing_and_unknown_ones_are_skipped() {
@@ -146,18 +119,5 @@ mod tests {
         assert!(back.take(1, &mut layout) && !layout.is_visible(PanelName::Rank));
         layout.set_visible(PanelName::Rank, true);
         assert!(layout.is_visible(PanelName::Rank) && !back.take(2, &mut layout));
-    }
-
-    #[test]
-    fn the_last_layout_is_restored_with_the_name_of_its_preset() {
-        let mut layout = PanelLayout::default();
-        layout.arrange(Preset::FrontEnd);
-        layout.set_visible(PanelName::Scene, false);
-        let value = last_layout_value(&layout).unwrap();
-        let mut next = PanelLayout::default();
-        take_last_layout(&mut next, &value);
-        assert!(next == layout && next.preset == Some(Preset::FrontEnd));
-        take_last_layout(&mut next, &serde_json::json!({ "preset": "Overview", "panels": 7 }));
-        assert!(next == layout, "a value of another format changes nothing");
     }
 }

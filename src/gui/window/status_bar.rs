@@ -1,10 +1,12 @@
 //! Status bar: step time, real-time factor, memory, clock, warnings.
 
+use std::path::PathBuf;
+
 use egui::{Align, Button, FontId, Label, Layout as UiLayout, ProgressBar, RichText, TextStyle, Ui};
 
+use super::notices::Notices;
 use super::progress::Progress;
 use super::request::WindowRequest;
-use super::state::MainWindow;
 use crate::gui::theme::{self, Theme};
 use crate::gui::units::{bytes, counted, fixed, seconds};
 use crate::gui::{PanelContext, ReadingCursor};
@@ -19,7 +21,30 @@ const OPENING_WIDTH: f32 = 240.0;
 /// Number of steps over which the real-time factor is averaged.
 const STEPS_OF_MEAN: usize = 100;
 
-pub(super) fn ui(ui: &mut Ui, state: &mut MainWindow, ctx: &PanelContext<'_>) {
+/// State of the application that the bars show.
+#[derive(Debug, Default)]
+pub struct AppStatus {
+    /// Memory of the process in bytes, if known. It differs between executions, so screenshots omit it.
+    pub memory_bytes: Option<u64>,
+    /// Show step times; screenshots omit them for the same reason.
+    pub show_times: bool,
+    /// Progress of the estimation; `None` when all steps are computed.
+    pub progress: Option<Progress>,
+    /// Progress of a log that is being opened while another one is shown, as text.
+    pub opening: Option<String>,
+    /// Name of the study from which the session was opened.
+    pub study: Option<String>,
+    /// Recently opened logs and sessions, newest first, for the menu.
+    pub recent_logs: Vec<PathBuf>,
+}
+
+pub(super) fn ui(
+    ui: &mut Ui,
+    status: &AppStatus,
+    ctx: &PanelContext<'_>,
+    notices: &mut Notices,
+    requests: &mut Vec<WindowRequest>,
+) {
     let theme = *ctx.theme;
     let run = ctx.recording.runs.get(ctx.selection.run.min(ctx.recording.runs.len().saturating_sub(1)));
     ui.horizontal_centered(|ui| {
@@ -28,7 +53,7 @@ pub(super) fn ui(ui: &mut Ui, state: &mut MainWindow, ctx: &PanelContext<'_>) {
         let mut pair = |rank: u8, name: &'static str, value: String, hover: &str| {
             fields.push(Field { rank, name, value, hover: hover.to_owned() });
         };
-        if let Some(run) = run.filter(|_| state.show_times) {
+        if let Some(run) = run.filter(|_| status.show_times) {
             if let Some(step) = run.step_at(ctx.cursor_ns) {
                 let hover = "Processing time of the step at the cursor, ms";
                 pair(1, "step", format!("{} ms", fixed(step.report.times.step_ms, 1)), hover);
@@ -38,7 +63,7 @@ pub(super) fn ui(ui: &mut Ui, state: &mut MainWindow, ctx: &PanelContext<'_>) {
                 pair(2, "speed", format!("{}× real-time", fixed(factor, 1)), hover);
             }
         }
-        if let Some(memory) = state.memory_bytes {
+        if let Some(memory) = status.memory_bytes {
             pair(4, "memory", bytes(memory), "Resident memory of the process");
             let (text, hover) = recorded(ctx.recording);
             pair(0, "recording", text, &hover);
@@ -68,8 +93,8 @@ pub(super) fn ui(ui: &mut Ui, state: &mut MainWindow, ctx: &PanelContext<'_>) {
         }
         let count = warning_lines(ctx.recording).len();
         let reserved = RIGHT_WIDTH
-            + if state.progress.is_some() { PROGRESS_WIDTH + 5.0 } else { 0.0 }
-            + if state.opening.is_some() { OPENING_WIDTH } else { 0.0 };
+            + if status.progress.is_some() { PROGRESS_WIDTH + 5.0 } else { 0.0 }
+            + if status.opening.is_some() { OPENING_WIDTH } else { 0.0 };
         fields_ui(ui, &theme, fields, ui.available_width() - reserved);
         ui.with_layout(UiLayout::right_to_left(Align::Center), |ui| {
             let (text, color) = if count == 0 {
@@ -79,15 +104,15 @@ pub(super) fn ui(ui: &mut Ui, state: &mut MainWindow, ctx: &PanelContext<'_>) {
             };
             let button = Button::new(RichText::new(text).small().color(color)).frame(count > 0);
             if ui.add(button).on_hover_text("Warnings of the log and the runs (W)").clicked() {
-                state.notices.list_open = !state.notices.list_open;
+                notices.list_open = !notices.list_open;
             }
-            if let Some(progress) = &state.progress {
+            if let Some(progress) = &status.progress {
                 progress_ui(ui, progress);
             }
-            if let Some(text) = &state.opening
+            if let Some(text) = &status.opening
                 && opening_ui(ui, text)
             {
-                state.requests.push(WindowRequest::CancelOpening);
+                requests.push(WindowRequest::CancelOpening);
             }
         });
     });

@@ -70,7 +70,7 @@ pub(super) fn bench() -> Harness<'static, Bench> {
 /// A window in which a panel is in front.
 pub(super) fn bench_with(panel: PanelName) -> Harness<'static, Bench> {
     let mut harness = bench();
-    harness.state_mut().window.layout.set_visible(panel, true);
+    harness.state_mut().window.tiles.layout.set_visible(panel, true);
     harness.run_steps(3);
     harness
 }
@@ -171,7 +171,7 @@ fn keys_push_the_same_commands() {
     }
     harness.key_press(Key::Num3);
     harness.run_steps(3);
-    assert_eq!(harness.state().window.layout.preset, Some(Preset::FrontEnd));
+    assert_eq!(harness.state().window.tiles.layout.preset, Some(Preset::FrontEnd));
     harness.key_press(Key::T);
     harness.run_steps(2);
     assert_eq!(harness.state().window.settings.theme, ThemeName::Light);
@@ -238,7 +238,7 @@ fn a_run_is_added_through_the_dialog() {
 fn breakpoints_bench(conditions: &[&str]) -> Harness<'static, Bench> {
     let mut harness = bench();
     let state = harness.state_mut();
-    state.window.layout.set_visible(PanelName::Breakpoints, true);
+    state.window.tiles.layout.set_visible(PanelName::Breakpoints, true);
     let mut breakpoints = Breakpoints::default();
     for condition in conditions {
         breakpoints.add(condition.parse().unwrap());
@@ -598,7 +598,7 @@ fn every_panel_explains_itself_and_leads_to_its_section() {
         harness.run_steps(3);
         assert!(!harness.state().window.help.manual.is_open(), "Escape closes the manual");
     }
-    harness.state_mut().window.focus = Some(PanelName::Scene);
+    harness.state_mut().window.tiles.focus = Some(PanelName::Scene);
     harness.key_press(Key::F1);
     harness.run_steps(3);
     assert!(harness.query_by_label("Open manual: Scene").is_some());

@@ -24,7 +24,7 @@ pub(super) fn ui(ui: &mut Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>
         ui.spacing_mut().item_spacing.x = 4.0;
         menu::ui(ui, state, ctx, actions);
         ui.separator();
-        if let Some(study) = &state.study {
+        if let Some(study) = &state.status.study {
             study_button(ui, study, actions);
         }
         let log = ctx.recording.log_name();
@@ -165,7 +165,7 @@ fn layout_button(
     named: bool,
     actions: &mut Vec<Action>,
 ) {
-    let on = state.layout.preset == Some(preset);
+    let on = state.tiles.layout.preset == Some(preset);
     let text = if named { preset.name().to_owned() } else { number.to_string() };
     let response = ui.add(Button::new(text).selected(on).min_size(vec2(22.0, 20.0)));
     let name = format!("Layout {}", preset.name());

@@ -62,6 +62,11 @@ impl Recording {
         self.log_path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
     }
 
+    /// Name of the log without its extension, for the names of files.
+    pub fn log_stem(&self) -> String {
+        self.log_path.file_stem().map_or_else(|| "log".to_owned(), |stem| stem.to_string_lossy().into_owned())
+    }
+
     /// The runs of a plan before their first step.
     pub fn new(plan: &SessionPlan) -> Self {
         let position_truth = plan.position_truth.as_ref().map(|loaded| {

@@ -1,11 +1,12 @@
 //! Form of a new rig: mechanism, camera, position and topics.
 
-use egui::{ComboBox, DragValue, Grid, RichText, Ui, vec2};
+use egui::{DragValue, Grid, RichText, Ui, vec2};
 
 use super::topic_fields::{AngleField, TopicFields};
 use crate::flight_log::rig_template::{CameraChoice, MechanismAxes, PublishedCamera, RigChoices, suggested_mechanism};
 use crate::flight_log::{FlightLog, MessageKind};
 use crate::gui::theme::Theme;
+use crate::gui::widgets::choice_ui;
 use crate::sensors::BodyAxes;
 use crate::text::Named as _;
 
@@ -104,33 +105,20 @@ impl RigForm {
             });
             ui.end_row();
             if !self.mechanism.0.is_empty() {
-                let name = ui.label("Positive angles");
-                let text = |axes: BodyAxes| match axes {
-                    BodyAxes::Frd => "right, up (frd: autopilots, DJI)",
-                    BodyAxes::Flu => "left, down (flu: ROS)",
+                let text = |axes: &BodyAxes| match axes {
+                    BodyAxes::Frd => "right, up (frd: autopilots, DJI)".to_owned(),
+                    BodyAxes::Flu => "left, down (flu: ROS)".to_owned(),
                 };
-                let combo = ComboBox::from_id_salt("positive").width(COMBO_WIDTH).selected_text(text(self.positive));
-                let shown = combo.show_ui(ui, |ui| {
-                    for axes in BodyAxes::all() {
-                        ui.selectable_value(&mut self.positive, axes, text(axes));
-                    }
-                });
-                shown.response.labelled_by(name.id);
+                choice_ui(ui, "Positive angles", COMBO_WIDTH, &mut self.positive, BodyAxes::all(), text);
                 ui.end_row();
             }
-            let name = ui.label("Axes of the IMU");
-            let text = |axes: Option<BodyAxes>| match axes {
-                None => "from gravity in the log",
-                Some(BodyAxes::Frd) => "forward, right, down (frd)",
-                Some(BodyAxes::Flu) => "forward, left, up (flu)",
+            let text = |axes: &Option<BodyAxes>| match axes {
+                None => "from gravity in the log".to_owned(),
+                Some(BodyAxes::Frd) => "forward, right, down (frd)".to_owned(),
+                Some(BodyAxes::Flu) => "forward, left, up (flu)".to_owned(),
             };
-            let combo = ComboBox::from_id_salt("imu axes").width(COMBO_WIDTH).selected_text(text(self.imu_axes));
-            let shown = combo.show_ui(ui, |ui| {
-                for axes in std::iter::once(None).chain(BodyAxes::all().map(Some)) {
-                    ui.selectable_value(&mut self.imu_axes, axes, text(axes));
-                }
-            });
-            shown.response.labelled_by(name.id);
+            let axes = std::iter::once(None).chain(BodyAxes::all().map(Some));
+            choice_ui(ui, "Axes of the IMU", COMBO_WIDTH, &mut self.imu_axes, axes, text);
             ui.end_row();
             self.topics.ui(ui, !self.mechanism.0.is_empty(), COMBO_WIDTH);
         });
@@ -139,36 +127,22 @@ impl RigForm {
     }
 
     fn mechanism_ui(&mut self, ui: &mut Ui) {
-        let name = ui.label("Mechanism");
-        let shown = self.mechanism.to_string();
-        let combo = ComboBox::from_id_salt("mechanism").width(COMBO_WIDTH).selected_text(shown);
-        let shown = combo.show_ui(ui, |ui| {
-            for text in MECHANISMS {
-                if let Ok(mechanism) = text.parse::<MechanismAxes>() {
-                    ui.selectable_value(&mut self.mechanism, mechanism, text);
-                }
-            }
-        });
-        shown.response.labelled_by(name.id).on_hover_text("Axes from the vehicle to the camera");
+        let known = MECHANISMS.into_iter().filter_map(|text| text.parse::<MechanismAxes>().ok());
+        choice_ui(ui, "Mechanism", COMBO_WIDTH, &mut self.mechanism, known, ToString::to_string)
+            .on_hover_text("Axes from the vehicle to the camera");
         ui.end_row();
     }
 
     fn camera_ui(&mut self, ui: &mut Ui) {
-        let name = ui.label("Camera");
-        let text = |camera: CameraField| match camera {
-            CameraField::Info => "CameraInfo of the log",
-            CameraField::FieldOfView => "horizontal field of view",
-            CameraField::Published(camera) => camera.name(),
+        let text = |camera: &CameraField| match camera {
+            CameraField::Info => "CameraInfo of the log".to_owned(),
+            CameraField::FieldOfView => "horizontal field of view".to_owned(),
+            CameraField::Published(camera) => camera.name().to_owned(),
         };
-        let combo = ComboBox::from_id_salt("camera").width(COMBO_WIDTH).selected_text(text(self.camera));
-        let shown = combo.show_ui(ui, |ui| {
-            let info = self.has_info.then_some(CameraField::Info);
-            let published = PublishedCamera::ALL.into_iter().map(CameraField::Published);
-            for camera in info.into_iter().chain([CameraField::FieldOfView]).chain(published) {
-                ui.selectable_value(&mut self.camera, camera, text(camera));
-            }
-        });
-        shown.response.labelled_by(name.id);
+        let info = self.has_info.then_some(CameraField::Info);
+        let published = PublishedCamera::ALL.into_iter().map(CameraField::Published);
+        let cameras = info.into_iter().chain([CameraField::FieldOfView]).chain(published);
+        choice_ui(ui, "Camera", COMBO_WIDTH, &mut self.camera, cameras, text);
         ui.end_row();
         if self.camera == CameraField::FieldOfView {
             let name = ui.label("Field of view");

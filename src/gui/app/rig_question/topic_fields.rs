@@ -4,6 +4,7 @@ use egui::{ComboBox, Ui};
 
 use crate::flight_log::joints::attitude::VEHICLE_KINDS;
 use crate::flight_log::{FlightLog, MessageKind, TopicInfo};
+use crate::gui::widgets::choice_ui;
 use crate::sensors::{AngleUnit, AttitudeFrame, BodyAxes};
 use crate::text::Named as _;
 
@@ -156,14 +157,7 @@ impl TopicFields {
         if !gimbal {
             return;
         }
-        let name = ui.label("Gimbal angles");
-        let combo = ComboBox::from_id_salt("angles").width(width).selected_text(self.angles.text());
-        let shown = combo.show_ui(ui, |ui| {
-            for source in &self.sources {
-                ui.selectable_value(&mut self.angles, source.clone(), source.text());
-            }
-        });
-        shown.response.labelled_by(name.id);
+        choice_ui(ui, "Gimbal angles", width, &mut self.angles, self.sources.iter().cloned(), AngleField::text);
         ui.end_row();
         if !self.has_attitudes() {
             return;
@@ -207,14 +201,7 @@ fn are_halves(imus: &[String]) -> bool {
 }
 
 fn topic_ui(ui: &mut Ui, label: &str, chosen: &mut Option<String>, topics: &[String], width: f32) {
-    let name = ui.label(label);
-    let text = chosen.clone().unwrap_or_else(|| "found in the log".to_owned());
-    let combo = ComboBox::from_id_salt(label).width(width).selected_text(text);
-    let shown = combo.show_ui(ui, |ui| {
-        for topic in topics {
-            ui.selectable_value(chosen, Some(topic.clone()), topic);
-        }
-    });
-    shown.response.labelled_by(name.id);
+    let text = |topic: &Option<String>| topic.clone().unwrap_or_else(|| "found in the log".to_owned());
+    choice_ui(ui, label, width, chosen, topics.iter().cloned().map(Some), text);
     ui.end_row();
 }

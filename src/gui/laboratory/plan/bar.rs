@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use egui::{Button, CollapsingHeader, ComboBox, DragValue, ProgressBar, RichText, Role, TextEdit, Ui, WidgetInfo};
+use egui::{Button, CollapsingHeader, DragValue, ProgressBar, RichText, Role, TextEdit, Ui, WidgetInfo};
 
 use super::super::request::MotionRequest;
 use super::edited::EditedMotion;
@@ -11,6 +11,7 @@ use super::{PlanInputs, PlanView, WIDTHS_S};
 use crate::gui::PanelContext;
 use crate::gui::help::terms::window;
 use crate::gui::units::fixed;
+use crate::gui::widgets::choice_ui;
 use crate::observability::laboratory::{MotionProblem, MotionStart};
 use crate::text::Named as _;
 
@@ -84,14 +85,9 @@ impl PlanView {
 
     /// Chooses the motion from which to start.
     fn start_ui(&mut self, ui: &mut Ui, inputs: PlanInputs<'_>) {
-        let name = ui.label("Start");
-        let combo = ComboBox::from_id_salt("start of the motion").width(120.0);
-        let shown = combo.selected_text(self.settings.start.name()).show_ui(ui, |ui| {
-            for start in MotionStart::all() {
-                ui.selectable_value(&mut self.settings.start, start, start.name());
-            }
-        });
-        shown.response.labelled_by(name.id).on_hover_text(window::PLAN_START.meaning);
+        let start = &mut self.settings.start;
+        choice_ui(ui, "Start", 120.0, start, MotionStart::all(), |start| start.name().to_owned())
+            .on_hover_text(window::PLAN_START.meaning);
         let begin = ui.add_enabled(self.search.is_none(), Button::new("Begin with it"));
         if begin.on_hover_text("Replace the motion by this start").clicked() {
             self.start_search(ui, PlanSearch::Start(self.settings.start), inputs);
@@ -105,11 +101,7 @@ impl PlanView {
 
     /// Saves the motion to a file and opens one.
     fn file_ui(&mut self, ui: &mut Ui, ctx: &PanelContext<'_>, problem: &MotionProblem) {
-        let path = self.path.get_or_insert_with(|| {
-            let stem = ctx.recording.log_path.file_stem();
-            let stem = stem.map_or_else(|| "log".into(), |stem| stem.to_string_lossy().into_owned());
-            format!("dcvins-output/{stem}/motion.csv")
-        });
+        let path = self.path.get_or_insert_with(|| format!("dcvins-output/{}/motion.csv", ctx.recording.log_stem()));
         let Some(edited) = &self.edited else { return };
         ui.horizontal_wrapped(|ui| {
             let name = ui.label("File");

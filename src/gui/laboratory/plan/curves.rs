@@ -9,12 +9,12 @@ use egui::{
 use super::edited::EditedMotion;
 use crate::geometry::ns_from_seconds;
 use crate::gui::PanelContext;
-use crate::gui::accessible::describe;
 use crate::gui::plot::{
     PlotArea, TICKS_ONLY, TIME_GUTTER, paint_ground, paint_hatch, paint_time_axis, paint_value_axis, within_gutters,
 };
 use crate::gui::theme::{CURVE_WIDTH, label_font};
 use crate::gui::units::fixed;
+use crate::gui::widgets::describe;
 use crate::observability::laboratory::{MotionLimits, Situation};
 use crate::simulation::MotionSplines;
 

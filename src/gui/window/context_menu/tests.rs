@@ -115,12 +115,12 @@ fn a_run_a_feature_and_a_tab_have_menus() {
 
     let tab = harness.get_by_label("Scene").rect().center();
     choose(&mut harness, tab, "Maximize the panel");
-    assert_eq!(harness.state().window.layout.maximized(), Some(PanelName::Scene));
+    assert_eq!(harness.state().window.tiles.layout.maximized(), Some(PanelName::Scene));
     let tab = harness.get_by_label("Scene").rect().center();
     choose(&mut harness, tab, "Restore all panels");
     let tab = harness.get_by_label("Scene").rect().center();
     choose(&mut harness, tab, "Close the panel");
-    assert!(!harness.state().window.layout.is_visible(PanelName::Scene));
+    assert!(!harness.state().window.tiles.layout.is_visible(PanelName::Scene));
     let tab = harness.get_by_label("Image").rect().center();
     choose(&mut harness, tab, "Export the panel");
     let written = harness.state().window.requests.last();

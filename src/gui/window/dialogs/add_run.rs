@@ -1,9 +1,10 @@
 //! The dialog that adds a run on the same log.
 
-use egui::{Checkbox, ComboBox, DragValue, Grid, RichText, TextEdit, Ui, vec2};
+use egui::{Checkbox, DragValue, Grid, RichText, TextEdit, Ui, vec2};
 
 use super::modal::{Modal, accept_or_cancel_ui};
 use crate::gui::PanelContext;
+use crate::gui::widgets::hinted_choice_ui;
 use crate::session::{Command, ParameterizationChoice, RunSpec};
 use crate::text::{Field, Named as _};
 
@@ -62,15 +63,9 @@ impl AddRunDialog {
 
     fn fields_ui(&mut self, ui: &mut Ui, theme: &crate::gui::theme::Theme) {
         Grid::new("add run").num_columns(2).spacing(vec2(12.0, 6.0)).show(ui, |ui| {
-            let name = ui.label("Parameterization");
             let choice = &mut self.spec.parameterization;
-            let combo = ComboBox::from_id_salt("parameterization").width(260.0).selected_text(choice.name());
-            let shown = combo.show_ui(ui, |ui| {
-                for offered in ParameterizationChoice::all() {
-                    ui.selectable_value(choice, offered, offered.name()).on_hover_text(offered.summary());
-                }
-            });
-            shown.response.labelled_by(name.id);
+            let (offered, text) = (ParameterizationChoice::all(), |it: &ParameterizationChoice| it.name().to_owned());
+            hinted_choice_ui(ui, "Parameterization", 260.0, choice, offered, text, |it| it.summary());
             ui.end_row();
             ui.label("");
             ui.label(RichText::new(choice.summary()).color(theme.text_weak));

@@ -6,6 +6,7 @@ use egui::{Button, Label, ProgressBar, RichText, ScrollArea, Ui};
 
 use super::modal::Modal;
 use crate::gui::PanelContext;
+use crate::gui::units::capitalized;
 use crate::session::{Command, Diagnosis, RankedCause};
 
 /// Period at which the dialog looks for progress.
@@ -88,11 +89,6 @@ fn cause_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, run: usize, cause: &RankedC
     if explains {
         ui.add(Label::new(RichText::new(capitalized(&cause.remedy)).color(theme.text_weak)).wrap());
     }
-}
-
-fn capitalized(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Dialog "Figure for a paper": panel, time range, size, font and format, with a preview and the command that repeats it.
 
-use egui::{Button, ColorImage, ComboBox, DragValue, Grid, Image, Label, RichText, ScrollArea, TextEdit, Ui, vec2};
+use egui::{Button, ColorImage, DragValue, Grid, Image, Label, RichText, ScrollArea, TextEdit, Ui, vec2};
 use egui::{TextureHandle, TextureOptions};
 
 use super::modal::{Modal, accept_or_cancel_ui};
@@ -8,6 +8,7 @@ use crate::geometry::{ns_from_seconds, seconds_from_ns};
 use crate::gui::comparison::ComparisonView;
 use crate::gui::desktop::FigureExport;
 use crate::gui::theme::ThemeName;
+use crate::gui::widgets::choice_ui;
 use crate::gui::window::figure::{FIGURE_FONT_PT, FIGURE_SIDE_MM, FigureFormat, FigureInput, FigureSpec};
 use crate::gui::window::panels::Panels;
 use crate::gui::window::request::WindowRequest;
@@ -173,15 +174,8 @@ fn chosen_ui<'a, T: Copy + PartialEq>(
     choices: impl IntoIterator<Item = (T, &'a str)>,
 ) {
     let choices: Vec<(T, &str)> = choices.into_iter().collect();
-    let name = ui.label(label);
-    let shown = choices.iter().find(|(choice, _)| choice == value).map_or("", |(_, text)| text);
-    let combo = ComboBox::from_id_salt(label).width(210.0).selected_text(shown);
-    let combo = combo.show_ui(ui, |ui| {
-        for (choice, text) in choices {
-            ui.selectable_value(value, choice, text);
-        }
-    });
-    combo.response.labelled_by(name.id);
+    let text = |value: &T| choices.iter().find(|(choice, _)| choice == value).map_or("", |(_, text)| text).to_owned();
+    choice_ui(ui, label, 210.0, value, choices.iter().map(|(choice, _)| *choice), text);
     ui.end_row();
 }
 
@@ -298,15 +292,11 @@ fn has_forks(recording: &Recording) -> bool {
 /// The log, or with forks the saved session, as the command names it.
 fn log_of(recording: &Recording) -> String {
     if has_forks(recording) {
-        let stem = stem_of(recording);
+        let stem = recording.log_stem();
         format!("dcvins-output/{stem}/{stem}.session.json")
     } else {
         recording.log_path.display().to_string()
     }
-}
-
-fn stem_of(recording: &Recording) -> String {
-    recording.log_path.file_stem().map_or_else(|| "log".into(), |stem| stem.to_string_lossy().into_owned())
 }
 
 /// Path of the file, with its extension.
@@ -315,6 +305,6 @@ fn path_of(spec: &FigureSpec, format: FigureFormat, recording: &Recording) -> St
     let range = spec.range_ns.map_or_else(String::new, |(begin_ns, end_ns)| {
         format!("-{:.2}-{:.2}s", seconds_from_ns(begin_ns), seconds_from_ns(end_ns))
     });
-    let (stem, panel, width_mm) = (stem_of(recording), spec.panel.name(), spec.width_mm);
+    let (stem, panel, width_mm) = (recording.log_stem(), spec.panel.name(), spec.width_mm);
     format!("dcvins-output/{stem}/{panel}{view}{range}-{width_mm}mm.{}", format.name())
 }

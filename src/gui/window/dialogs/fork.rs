@@ -2,13 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use egui::{ComboBox, DragValue, Grid, RichText, TextEdit, Ui, vec2};
+use egui::{DragValue, Grid, RichText, TextEdit, Ui, vec2};
 
 use super::modal::{Modal, accept_or_cancel_ui};
 use crate::estimator::SensorParameters;
 use crate::gimbal::ParameterGroup;
 use crate::gui::PanelContext;
 use crate::gui::units::seconds;
+use crate::gui::widgets::choice_ui;
 use crate::session::{Command, FORK_PARAMETERIZATIONS, ForkChanges, RunSpec};
 use crate::text::{Field, Key, Label, Named as _, nearest_name, written_items};
 
@@ -105,14 +106,8 @@ impl ForkDialog {
         Grid::new("fork").num_columns(2).spacing(vec2(12.0, 6.0)).show(ui, |ui| {
             let names: Vec<&str> =
                 std::iter::once(AS_BEFORE).chain(FORK_PARAMETERIZATIONS.iter().map(|choice| choice.name())).collect();
-            let name = ui.label("Parameterization");
-            let combo = ComboBox::from_id_salt("fork parameterization").width(260.0).selected_text(names[self.choice]);
-            let shown = combo.show_ui(ui, |ui| {
-                for (number, name) in names.iter().enumerate() {
-                    ui.selectable_value(&mut self.choice, number, *name);
-                }
-            });
-            shown.response.labelled_by(name.id);
+            let text = |choice: &usize| names[*choice].to_owned();
+            choice_ui(ui, "Parameterization", 260.0, &mut self.choice, 0..names.len(), text);
             ui.end_row();
             let parameter = selected.0.map_or_else(|| "yaw.alpha".to_owned(), |parameter| ctx.names().name(parameter));
             let feature = selected.1.map_or_else(|| "12 15".to_owned(), |id| id.0.to_string());

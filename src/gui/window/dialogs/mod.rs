@@ -19,14 +19,28 @@ use egui::Ui;
 
 pub(in crate::gui) use self::modal::Modal;
 use self::open_log::Picked;
+use self::state::Dialogs;
 use super::actions::Action;
+use super::history::SettingsHistory;
+use super::panel_tiles::PanelTiles;
+use super::panels::Panels;
 use super::request::WindowRequest;
-use super::state::MainWindow;
+use super::settings::Settings;
 use crate::gui::{Dialog, PanelContext};
 
+/// Parts of the window on which the dialogs act.
+pub(super) struct DialogParts<'a> {
+    pub(super) panels: &'a Panels,
+    pub(super) tiles: &'a PanelTiles,
+    pub(super) settings: &'a mut Settings,
+    pub(super) history: &'a mut SettingsHistory,
+    pub(super) requests: &'a mut Vec<WindowRequest>,
+    pub(super) actions: &'a mut Vec<Action>,
+}
+
 /// Draws the dialog that is open.
-pub(super) fn ui(ui: &Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>, actions: &mut Vec<Action>) {
-    let MainWindow { dialogs, panels, requests, saved_layouts, settings, layout, history, .. } = state;
+pub(super) fn ui(ui: &Ui, dialogs: &mut Dialogs, ctx: &mut PanelContext<'_>, parts: DialogParts<'_>) {
+    let DialogParts { panels, tiles, settings, history, requests, actions } = parts;
     let picked = dialogs.open_log.picked(ui);
     if picked.is_some() && dialogs.open == Some(Dialog::OpenLog) {
         dialogs.open = None;
@@ -46,8 +60,8 @@ pub(super) fn ui(ui: &Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>, ac
         Some(Dialog::Diagnosis) => diagnosis::ui(ui, ctx),
         Some(Dialog::Markers) => dialogs.markers.ui(ui, ctx),
         Some(Dialog::Figure) => dialogs.figure.ui(ui, ctx, panels, requests),
-        Some(Dialog::Palette) => dialogs.palette.ui(ui, ctx, saved_layouts, layout, actions),
-        Some(Dialog::Settings) => settings::ui(ui, ctx.theme, settings, history, saved_layouts.names(), actions),
+        Some(Dialog::Palette) => dialogs.palette.ui(ui, ctx, tiles, actions),
+        Some(Dialog::Settings) => settings::ui(ui, ctx.theme, settings, history, tiles.saved.names(), actions),
         Some(Dialog::RemoveRun) => remove_run::ui(ui, ctx, dialogs.removed_run, history),
         Some(Dialog::Unsaved) => unsaved::ui(ui, ctx, &dialogs.unsaved, requests),
     };

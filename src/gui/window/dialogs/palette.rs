@@ -6,8 +6,7 @@ use super::modal::Modal;
 use super::palette_items::{Choice, Item, found};
 use crate::gui::PanelContext;
 use crate::gui::window::actions::Action;
-use crate::gui::window::saved_layouts::SavedLayouts;
-use crate::gui::window::tiles::PanelLayout;
+use crate::gui::window::panel_tiles::PanelTiles;
 use crate::session::Command;
 
 /// Width of the palette and height of its list in points.
@@ -29,8 +28,7 @@ impl CommandPalette {
         &mut self,
         ui: &Ui,
         ctx: &mut PanelContext<'_>,
-        layouts: &SavedLayouts,
-        layout: &PanelLayout,
+        tiles: &PanelTiles,
         actions: &mut Vec<Action>,
     ) -> bool {
         let theme = *ctx.theme;
@@ -48,7 +46,7 @@ impl CommandPalette {
             if edit.changed() {
                 self.chosen = 0;
             }
-            let items = found(&self.typed, ui, ctx, layouts, layout);
+            let items = found(&self.typed, ui, ctx, tiles);
             let last = items.len().saturating_sub(1);
             let before = self.chosen;
             self.chosen = match moved {

@@ -6,13 +6,12 @@ use super::fuzzy;
 use crate::frontend::FeatureId;
 use crate::geometry::ns_from_seconds;
 use crate::gimbal::ParameterId;
-use crate::gui::convergence::names::meaning_of;
+use crate::gui::parameter_names::meaning_of;
 use crate::gui::theme::ThemeName;
 use crate::gui::timeline::SPEEDS;
 use crate::gui::units::seconds;
 use crate::gui::window::actions::{Action, TABLE, keys_of};
-use crate::gui::window::saved_layouts::SavedLayouts;
-use crate::gui::window::tiles::PanelLayout;
+use crate::gui::window::panel_tiles::PanelTiles;
 use crate::gui::{Dialog, PanelContext, PanelName};
 use crate::session::RunRecord;
 use crate::text::Named as _;
@@ -37,15 +36,9 @@ fn item(name: impl Into<String>, action: Action) -> Item {
 }
 
 /// Items that match the typed text, best first; all actions in their own order for an empty text.
-pub(super) fn found(
-    typed: &str,
-    ui: &Ui,
-    ctx: &PanelContext<'_>,
-    layouts: &SavedLayouts,
-    layout: &PanelLayout,
-) -> Vec<Item> {
+pub(super) fn found(typed: &str, ui: &Ui, ctx: &PanelContext<'_>, tiles: &PanelTiles) -> Vec<Item> {
     let places = places(typed, ctx);
-    let mut items = commands(ctx, layouts, layout);
+    let mut items = commands(ctx, tiles);
     if !typed.trim().is_empty() {
         items.extend(parameters(ui, ctx));
     }
@@ -56,14 +49,14 @@ pub(super) fn found(
     places.into_iter().chain(scored.into_iter().map(|(_, item)| item)).collect()
 }
 
-fn commands(ctx: &PanelContext<'_>, layouts: &SavedLayouts, layout: &PanelLayout) -> Vec<Item> {
+fn commands(ctx: &PanelContext<'_>, tiles: &PanelTiles) -> Vec<Item> {
     let listed = TABLE.iter().filter(|entry| {
         // Their effects are listed below, or are already in effect.
         !matches!(entry.action, Action::Dialog(Dialog::Palette) | Action::Dismiss | Action::SavedLayout(_))
     });
     let mut items: Vec<Item> = listed.map(|entry| item(entry.name, entry.action)).collect();
     items.push(item("Clear the selection", Action::Dismiss));
-    items.extend(layouts.names().enumerate().map(|(number, name)| {
+    items.extend(tiles.saved.names().enumerate().map(|(number, name)| {
         const KEYS: [&str; 9] =
             ["Ctrl+1", "Ctrl+2", "Ctrl+3", "Ctrl+4", "Ctrl+5", "Ctrl+6", "Ctrl+7", "Ctrl+8", "Ctrl+9"];
         let keys = KEYS.get(number).copied().unwrap_or_default();
@@ -75,7 +68,7 @@ fn commands(ctx: &PanelContext<'_>, layouts: &SavedLayouts, layout: &PanelLayout
     for panel in PanelName::all() {
         items.push(item(format!("Copy table of {} (CSV)", panel.name()), Action::CopyTable(panel)));
     }
-    for panel in PanelName::movable().filter(|panel| layout.is_visible(*panel)) {
+    for panel in PanelName::movable().filter(|panel| tiles.layout.is_visible(*panel)) {
         items.push(item(format!("Panel: hide {}", panel.name()), Action::Hide(panel)));
     }
     let runs = &ctx.recording.runs;

@@ -1,10 +1,11 @@
 //! Settings dialog.
 
-use egui::{ComboBox, DragValue, Grid, Key, Modifiers, RichText, Ui, vec2};
+use egui::{DragValue, Grid, Key, Modifiers, RichText, Ui, vec2};
 
 use super::modal::Modal;
 use crate::gui::theme::{Theme, ThemeName};
 use crate::gui::timeline::SPEEDS;
+use crate::gui::widgets::choice_ui;
 use crate::gui::window::actions::Action;
 use crate::gui::window::history::SettingsHistory;
 use crate::gui::window::settings::{LAST_LAYOUT, MEMORY_MIB, SCALES, Settings};
@@ -59,15 +60,8 @@ fn buttons_ui(ui: &mut Ui, settings: &mut Settings, history: &SettingsHistory, a
 
 fn fields_ui<'a>(ui: &mut Ui, settings: &mut Settings, layouts: impl Iterator<Item = &'a str>) {
     Grid::new("settings").num_columns(2).spacing(vec2(12.0, 6.0)).show(ui, |ui| {
-        let name = ui.label("Theme");
         let themes = [ThemeName::Light, ThemeName::Dark, ThemeName::Print];
-        let combo = ComboBox::from_id_salt("theme").width(200.0).selected_text(settings.theme.name());
-        let shown = combo.show_ui(ui, |ui| {
-            for theme in themes {
-                ui.selectable_value(&mut settings.theme, theme, theme.name());
-            }
-        });
-        shown.response.labelled_by(name.id);
+        choice_ui(ui, "Theme", 200.0, &mut settings.theme, themes, |theme| theme.name().to_owned());
         ui.end_row();
         let name = ui.label("Scale");
         let drag = DragValue::new(&mut settings.scale).range(SCALES).speed(0.01).max_decimals(2).suffix("×");
@@ -78,25 +72,12 @@ fn fields_ui<'a>(ui: &mut Ui, settings: &mut Settings, layouts: impl Iterator<It
             .labelled_by(name.id)
             .on_hover_text("Budget for steps and snapshots; over it older steps are summary only and recomputed when the cursor moves there");
         ui.end_row();
-        let name = ui.label("Initial layout");
-        let combo = ComboBox::from_id_salt("layout").width(200.0).selected_text(&settings.layout);
-        let shown = combo.show_ui(ui, |ui| {
-            let presets = Preset::NAMES.iter().map(|(_, name)| *name);
-            for layout in [LAST_LAYOUT].into_iter().chain(presets).chain(layouts) {
-                ui.selectable_value(&mut settings.layout, layout.to_owned(), layout);
-            }
-        });
-        shown.response.labelled_by(name.id);
+        let presets = Preset::NAMES.iter().map(|(_, name)| *name);
+        let layouts = [LAST_LAYOUT].into_iter().chain(presets).chain(layouts).map(str::to_owned);
+        choice_ui(ui, "Initial layout", 200.0, &mut settings.layout, layouts, String::clone);
         ui.end_row();
-        let name = ui.label("Initial playback speed");
-        let text = |speed: f64| format!("{speed}×");
-        let combo = ComboBox::from_id_salt("speed at the start").width(200.0).selected_text(text(settings.speed));
-        let shown = combo.show_ui(ui, |ui| {
-            for speed in SPEEDS {
-                ui.selectable_value(&mut settings.speed, speed, text(speed));
-            }
-        });
-        shown.response.labelled_by(name.id);
+        let speed = &mut settings.speed;
+        choice_ui(ui, "Initial playback speed", 200.0, speed, SPEEDS, |speed| format!("{speed}×"));
         ui.end_row();
         ui.label("Plots");
         ui.checkbox(&mut settings.event_lines, "Events and rank losses as lines")

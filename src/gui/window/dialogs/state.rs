@@ -15,6 +15,8 @@ use crate::gui::desktop::Desktop;
 #[derive(Default)]
 pub struct Dialogs {
     pub(super) open: Option<Dialog>,
+    /// True if the list of shortcuts is open.
+    pub shortcuts_open: bool,
     pub(super) open_log: OpenLogDialog,
     pub(super) add_run: AddRunDialog,
     pub(super) fork: ForkDialog,
@@ -72,7 +74,9 @@ impl Dialogs {
         self.open.is_some()
     }
 
+    /// Closes the open dialog and the list of shortcuts.
     pub fn close(&mut self) {
         self.open = None;
+        self.shortcuts_open = false;
     }
 }

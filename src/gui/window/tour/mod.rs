@@ -16,16 +16,17 @@ use egui::{Key, Modifiers, Popup, Ui};
 use self::card::{Pressed, card_ui};
 use self::state::Tour;
 use self::stop::Stop;
-use super::state::MainWindow;
-use crate::gui::{PanelContext, PanelName};
+use super::panel_tiles::PanelTiles;
+use crate::gui::PanelContext;
+use crate::gui::rank::RankPanel;
 
 /// Frames before the card is drawn: the layout of a stop is shown from the second one on.
 const FRAMES_TO_LAYOUT: u8 = 2;
 
 /// Reads the keys of the tour before the window reads its own: Enter for the next stop, Backspace for the one before.
-pub(super) fn keys(ui: &Ui, state: &mut MainWindow) {
-    let busy = state.dialogs.is_open() || ui.egui_wants_keyboard_input() || Popup::is_any_open(ui.ctx());
-    if !state.tour.is_running() || busy || ui.memory(|memory| memory.focused().is_some()) {
+pub(super) fn keys(ui: &Ui, tour: &mut Tour) {
+    let busy = ui.egui_wants_keyboard_input() || Popup::is_any_open(ui.ctx());
+    if !tour.is_running() || busy || ui.memory(|memory| memory.focused().is_some()) {
         return;
     }
     let pressed = ui.input_mut(|input| {
@@ -33,25 +34,18 @@ pub(super) fn keys(ui: &Ui, state: &mut MainWindow) {
         next.or_else(|| input.consume_key(Modifiers::NONE, Key::Backspace).then_some(Pressed::Back))
     });
     if let Some(pressed) = pressed {
-        state.tour.apply(pressed);
+        tour.apply(pressed);
     }
 }
 
 /// Arranges the window for the stop and draws its card.
-pub(super) fn ui(ui: &Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>) {
-    let mut tour = std::mem::take(&mut state.tour);
-    stop_ui(&mut tour, ui, state, ctx);
-    // No action of the tour starts another tour, so nothing is overwritten.
-    state.tour = tour;
-}
-
-fn stop_ui(tour: &mut Tour, ui: &Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>) {
+pub(super) fn ui(ui: &Ui, tour: &mut Tour, tiles: &mut PanelTiles, rank: &RankPanel, ctx: &mut PanelContext<'_>) {
     let Some(index) = tour.stop else { return };
     let stop = Stop::ALL[index];
     tour.read_story(ctx);
     let Some(story) = tour.story else { return };
     if tour.frames == 0 {
-        lay_out(stop, state);
+        lay_out(stop, tiles);
     }
     if !tour.arranged {
         tour.arranged = tour.arrange(stop, story, ctx);
@@ -67,24 +61,21 @@ fn stop_ui(tour: &mut Tour, ui: &Ui, state: &mut MainWindow, ctx: &mut PanelCont
         return;
     }
     let step = story.step(&ctx.recording.runs);
-    let excitation = step.and_then(|step| state.panels.rank.suggested_excitation(story.run, step));
+    let excitation = step.and_then(|step| rank.suggested_excitation(story.run, step));
     let text = texts::of(stop, story, ctx, excitation.as_deref());
     let (_, panel) = stop.place();
-    let place = state.places.iter().find(|(known, _)| *known == panel).map(|(_, place)| *place);
-    if let Some(pressed) = card_ui(ui, ctx.theme, (index, Stop::ALL.len()), &text, place) {
+    let card = (index, Stop::ALL.len());
+    if let Some(pressed) = card_ui(ui, ctx.theme, card, &text, tiles.place_of(panel)) {
         tour.apply(pressed);
         ui.ctx().request_repaint();
     }
 }
 
 /// Arranges the panels for a stop and focuses its panel.
-fn lay_out(stop: Stop, state: &mut MainWindow) {
+fn lay_out(stop: Stop, tiles: &mut PanelTiles) {
     let (preset, panel) = stop.place();
-    if state.layout.preset != Some(preset) {
-        state.layout.arrange(preset);
+    if tiles.layout.preset != Some(preset) {
+        tiles.arrange(preset);
     }
-    if panel != PanelName::Timeline {
-        state.layout.set_visible(panel, true);
-    }
-    state.focus = Some(panel);
+    tiles.show(panel);
 }

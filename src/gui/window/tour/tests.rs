@@ -36,7 +36,7 @@ fn stands_at(harness: &Harness<'static, Bench>, number: usize) -> bool {
 #[test]
 fn six_steps_drive_the_window_and_take_their_numbers_from_the_recording() {
     let mut harness = bench_of(recording(&["auto", "classical"]), SIZE);
-    harness.state_mut().window.start_tour();
+    harness.state_mut().window.tour.start();
     harness.run_steps(6);
     assert!(stands_at(&harness, 1));
     let mut story = Story::new(&harness.state().recording.runs[0]);
@@ -53,7 +53,7 @@ fn six_steps_drive_the_window_and_take_their_numbers_from_the_recording() {
         let pushed = press(&mut harness, Key::Enter);
         assert!(pushed.contains(&Command::Seek { stamp_ns: instant_ns }), "{number}: {pushed:?}");
         assert!(stands_at(&harness, number), "{number}");
-        assert_eq!(harness.state().window.focus, Some(panel));
+        assert_eq!(harness.state().window.tiles.focus, Some(panel));
         assert_eq!(harness.state().selection.run, run, "{number}");
         if number == 4 {
             let headline = verdict(&step, &harness.state().recording.rig.parameter_names()).headline;
@@ -78,7 +78,7 @@ fn six_steps_drive_the_window_and_take_their_numbers_from_the_recording() {
 fn the_run_for_comparison_is_added_once_and_escape_ends_the_tour() {
     let mut harness = bench_of(recording(&["auto"]), SIZE);
     assert_eq!(classical(&harness.state().recording.runs), None);
-    harness.state_mut().window.start_tour();
+    harness.state_mut().window.tour.start();
     harness.run_steps(6);
     let mut added = Vec::new();
     for _ in 2..=6 {
@@ -94,7 +94,7 @@ fn a_log_that_is_still_computed_is_waited_for() {
     let mut recording = recording(&["auto"]);
     recording.runs[0].finished = false;
     let mut harness = bench_of(recording, SIZE);
-    harness.state_mut().window.start_tour();
+    harness.state_mut().window.tour.start();
     harness.run_steps(6);
     let pushed = press(&mut harness, Key::Enter);
     assert!(!pushed.iter().any(|command| matches!(command, Command::Seek { .. })), "{pushed:?}");
