@@ -99,7 +99,7 @@ pub trait Desktop: Send + Sync {
     fn write_rig(&self, path: &Path, text: &str) -> Result<PathBuf, String>;
     /// Writes a motion with the names of its joints, and returns its path; an existing file is not replaced.
     fn write_motion(&self, path: &Path, motion: &MotionSplines, joint_names: &[String]) -> Result<PathBuf, String>;
-    /// Reads a motion.
+    /// Reads the file of a motion.
     fn read_motion(&self, path: &Path) -> Result<PrescribedMotion, String>;
     /// Resident memory of this process in bytes.
     fn resident_bytes(&self) -> Option<u64>;

@@ -13,7 +13,9 @@ use crate::frontend::FeatureId;
 use crate::gimbal::{ParameterId, ParameterNames};
 use crate::observability::{ChainSlide, SlidePosition};
 use crate::session::breakpoints::Breakpoints;
-use crate::session::{Command, DiagnosisProgress, FrameImage, Markers, Recording, RunRecord, SolverPosition};
+use crate::session::{
+    Command, DiagnosisProgress, FrameImage, Markers, Recording, RunRecord, SolverPosition, StepRecord,
+};
 use crate::text::Named;
 
 /// One of the panels: it draws itself, and gives its values.
@@ -138,9 +140,20 @@ pub struct PanelContext<'a> {
 }
 
 impl<'a> PanelContext<'a> {
-    /// The selected run, `None` before the first run has started.
+    /// Index of the selected run; of the last run where the selection is beyond it.
+    pub(crate) fn run_number(&self) -> usize {
+        self.selection.run.min(self.recording.runs.len().saturating_sub(1))
+    }
+
+    /// The run at [`Self::run_number`], `None` before the first run has started.
     pub fn selected_run(&self) -> Option<&'a RunRecord> {
-        self.recording.runs.get(self.selection.run)
+        self.recording.runs.get(self.run_number())
+    }
+
+    /// The selected run with its step at the cursor.
+    pub(crate) fn selected_step(&self) -> Option<(&'a RunRecord, &'a Arc<StepRecord>)> {
+        let run = self.selected_run()?;
+        Some((run, run.step_at(self.cursor_ns)?))
     }
 
     /// Names of calibration parameters and joints.
@@ -174,7 +187,7 @@ pub enum PanelName {
     Scene,
     /// Verdicts of the whole flight on every calibration parameter.
     Calibration,
-    /// Calibration over time.
+    /// Calibration parameters over time.
     Convergence,
     /// Rank and null directions.
     Rank,

@@ -20,7 +20,6 @@ mod requests;
 mod rig_question;
 pub mod run_window;
 mod sample;
-mod session_log;
 #[cfg(test)]
 mod session_tests;
 mod shown_study;

@@ -70,9 +70,9 @@ impl Scenes {
             let label = &ctx.recording.runs[run].spec.label;
             ui.label(RichText::new(label).strong().color(ctx.theme.run(run).color));
             let panel = &mut panels[run];
-            panel.follow(lead);
+            panel.look = lead.look;
             panel.ui(ui, ctx);
-            if !panel.looks_like(lead) {
+            if panel.look != lead.look {
                 *lead = panel.view_copy();
             }
         });

@@ -151,7 +151,7 @@ fn sides_of_the_solve_and_selection_are_shared_by_all_images() {
     harness.get_by_label("Images").click();
     harness.run_steps(3);
     let sides = |harness: &Harness<'static, Bench>| -> Vec<SolveSide> {
-        harness.state().panel.images.panels.iter().map(|panel| panel.side).collect()
+        harness.state().panel.images.panels.iter().map(|panel| panel.options.side).collect()
     };
     assert_eq!(sides(&harness), [SolveSide::After; 2]);
     harness.get_by_label("Before").click();

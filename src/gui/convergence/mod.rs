@@ -44,7 +44,7 @@ impl Panel for ConvergencePanel {
         let runs = self.histories.len();
         self.curves.retain(|(run, _), _| *run < runs);
 
-        let shown = ctx.selection.run.min(self.histories.len().saturating_sub(1));
+        let shown = ctx.run_number();
         let Some(history) = self.histories.get(shown) else {
             empty_ui(ui, "No runs");
             return;

@@ -14,9 +14,9 @@ use crate::session::{FlightVerdicts, RunRecord, StepRecord};
 pub(crate) struct ParameterCurve {
     /// Value by step; NaN where the parameterization has no such parameter.
     pub(crate) values: Vec<f64>,
-    /// Value minus 3σ.
+    /// Lower edge of the band of 3σ.
     pub(crate) lower: Vec<f64>,
-    /// Value plus 3σ.
+    /// Upper edge of the band of 3σ.
     pub(crate) upper: Vec<f64>,
     /// Standard deviation by step.
     pub(crate) sigmas: Vec<f64>,

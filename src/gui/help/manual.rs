@@ -107,7 +107,7 @@ impl Manual {
             }
             let name = RichText::new("Document").color(theme.text_weak);
             let mut document = self.place.document;
-            choice_ui(ui, name, 240.0, &mut document, DocumentId::all(), |document| document.title().to_owned());
+            choice_ui(ui, name, 240.0, &mut document, DocumentId::all(), |document| document.title());
             if document != self.place.document {
                 self.go(Place { document, anchor: None });
             }

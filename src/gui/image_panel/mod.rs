@@ -40,32 +40,11 @@ const DECODING_PERIOD: Duration = Duration::from_millis(15);
 const LINE_HEIGHT: f32 = 18.0;
 
 /// State of the image panel: options of the overlay, and the visible region of the image.
+#[derive(Default)]
 pub struct ImagePanel {
-    /// Residuals before or after the solve.
-    pub side: SolveSide,
-    pub magnification: f32,
-    pub residuals: bool,
-    pub trails: bool,
-    pub ids: bool,
-    /// Tint the pixels that the mask of the camera covers.
-    pub mask: bool,
+    pub(in crate::gui) options: MarkOptions,
     view: PanZoom,
     texture: Option<CachedTexture>,
-}
-
-impl Default for ImagePanel {
-    fn default() -> Self {
-        Self {
-            side: SolveSide::After,
-            magnification: 20.0,
-            residuals: true,
-            trails: true,
-            ids: false,
-            mask: true,
-            view: PanZoom::default(),
-            texture: None,
-        }
-    }
 }
 
 struct CachedTexture {
@@ -77,7 +56,7 @@ struct CachedTexture {
 
 impl Panel for ImagePanel {
     fn ui(&mut self, ui: &mut Ui, context: &mut PanelContext<'_>) {
-        let Some(run) = context.recording.runs.get(context.selection.run) else {
+        let Some(run) = context.selected_run() else {
             empty_ui(ui, "No runs");
             return;
         };
@@ -94,8 +73,7 @@ impl Panel for ImagePanel {
     }
 
     fn view_copy(&self) -> Self {
-        let Self { side, magnification, residuals, trails, ids, mask, view, .. } = *self;
-        Self { side, magnification, residuals, trails, ids, mask, view, texture: None }
+        Self { options: self.options, view: self.view, texture: None }
     }
 }
 
@@ -113,7 +91,7 @@ impl ImagePanel {
 
     /// Draws the image of a run among those of other runs: label and caption in one line, and the image.
     pub(in crate::gui) fn cell_ui(&mut self, ui: &mut Ui, context: &mut PanelContext<'_>) {
-        let Some(run) = context.recording.runs.get(context.selection.run) else { return };
+        let Some(run) = context.selected_run() else { return };
         let model = ImageModel::at(run, context.cursor_ns);
         ui.horizontal(|ui| {
             ui.set_height(LINE_HEIGHT);
@@ -134,7 +112,7 @@ impl ImagePanel {
     pub(in crate::gui) fn legend_ui(&self, ui: &mut Ui, context: &PanelContext<'_>, moved: bool) {
         let (legend, line) = ui.allocate_exact_size(vec2(ui.available_width(), LINE_HEIGHT), Sense::hover());
         line.on_hover_text(LEGEND);
-        paint::legend(ui.painter(), legend, context.theme, &self.mark_options(), moved);
+        paint::legend(ui.painter(), legend, context.theme, &self.options, moved);
     }
 
     /// Draws the image with its marks in a size in points.
@@ -150,23 +128,12 @@ impl ImagePanel {
 
     /// Copies the view of another panel.
     pub(in crate::gui) fn follow(&mut self, other: &Self) {
-        let Self { side, magnification, residuals, trails, ids, mask, view, .. } = *other;
-        let texture = self.texture.take();
-        *self = Self { side, magnification, residuals, trails, ids, mask, view, texture };
+        (self.options, self.view) = (other.options, other.view);
     }
 
     /// True if it has the view of another panel.
     pub(in crate::gui) fn looks_like(&self, other: &Self) -> bool {
-        let look = |panel: &Self| {
-            let Self { side, magnification, residuals, trails, ids, mask, view, .. } = *panel;
-            (side, magnification, residuals, trails, ids, mask, view)
-        };
-        look(self) == look(other)
-    }
-
-    fn mark_options(&self) -> MarkOptions {
-        let Self { side, magnification, residuals, trails, ids, .. } = *self;
-        MarkOptions { side, magnification, residuals, trails, ids }
+        (self.options, self.view) == (other.options, other.view)
     }
 
     fn controls_ui(&mut self, ui: &mut Ui, context: &PanelContext<'_>, run_label: &str) {
@@ -183,15 +150,15 @@ impl ImagePanel {
 
     /// Names the side of the solve in a figure.
     fn side_ui(&self, ui: &mut Ui) {
-        let side = if self.side == SolveSide::Before { "before" } else { "after" };
+        let side = if self.options.side == SolveSide::Before { "before" } else { "after" };
         ui.weak(format!("residuals {side} the solve"));
     }
 
     /// Draws the side of the solve and the options of the overlay.
     fn choices_ui(&mut self, ui: &mut Ui, has_mask: bool) {
-        ui.selectable_value(&mut self.side, SolveSide::Before, "Before")
+        ui.selectable_value(&mut self.options.side, SolveSide::Before, "Before")
             .on_hover_text("Reprojection residuals before the solve of this step");
-        ui.selectable_value(&mut self.side, SolveSide::After, "After")
+        ui.selectable_value(&mut self.options.side, SolveSide::After, "After")
             .on_hover_text("Reprojection residuals after the solve of this step");
         let wanted = OPTIONS_WIDTH + if has_mask { MASK_WIDTH } else { 0.0 };
         if ui.available_width() >= wanted {
@@ -204,21 +171,21 @@ impl ImagePanel {
 
     /// Draws the options of the overlay: in a row where they fit, else in a menu.
     fn options_ui(&mut self, ui: &mut Ui, has_mask: bool) {
-        ui.checkbox(&mut self.residuals, "Residuals")
+        ui.checkbox(&mut self.options.residuals, "Residuals")
             .on_hover_text("Reprojection residuals, prediction − measurement, px, magnified");
         ui.spacing_mut().slider_width = 70.0;
         ui.add_enabled(
-            self.residuals,
-            egui::Slider::new(&mut self.magnification, 1.0..=200.0)
+            self.options.residuals,
+            egui::Slider::new(&mut self.options.magnification, 1.0..=200.0)
                 .logarithmic(true)
                 .fixed_decimals(0)
                 .prefix("×")
                 .text("magnification"),
         );
-        ui.checkbox(&mut self.trails, "Trails").on_hover_text("Track trails: earlier pixels of each feature");
-        ui.checkbox(&mut self.ids, "Ids").on_hover_text("Feature ids");
+        ui.checkbox(&mut self.options.trails, "Trails").on_hover_text("Track trails: earlier pixels of each feature");
+        ui.checkbox(&mut self.options.ids, "Ids").on_hover_text("Feature ids");
         if has_mask {
-            ui.checkbox(&mut self.mask, "Mask").on_hover_text("Pixels that the camera's mask covers, tinted");
+            ui.checkbox(&mut self.options.mask, "Mask").on_hover_text("Pixels that the camera's mask covers, tinted");
         }
     }
 
@@ -239,7 +206,7 @@ impl ImagePanel {
         let painter = ui.painter_at(area);
         painter.rect_filled(area, 0.0, context.theme.plot_background);
         let size_px = image.as_ref().map(|image| [image.width, image.height]).unwrap_or_else(|| {
-            let camera_key = context.recording.runs.get(context.selection.run).map(|run| run.camera_key.as_str());
+            let camera_key = context.selected_run().map(|run| run.camera_key.as_str());
             let cameras = &context.recording.rig.cameras;
             let camera = cameras.iter().find(|camera| Some(camera.key.as_str()) == camera_key);
             camera.map_or([640, 480], |camera| camera.model.resolution_px)
@@ -248,7 +215,7 @@ impl ImagePanel {
         self.view.navigate(ui, context.theme, area, fitted, response, MAX_ZOOM);
         let place = ImagePlacement { rect: self.view.place(area, fitted), size_px };
         if let Some(image) = image {
-            let mask = mask_of(context).filter(|_| self.mask);
+            let mask = mask_of(context).filter(|_| self.options.mask);
             let texture = self.texture(ui, image, mask);
             let uv = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
             painter.image(texture, place.rect, uv, egui::Color32::WHITE);
@@ -257,9 +224,8 @@ impl ImagePanel {
             painter.rect_stroke(place.rect, 0.0, outline, egui::StrokeKind::Inside);
             paint::label(&painter, area.center_top() + vec2(0.0, 8.0), Align2::CENTER_TOP, absence);
         }
-        let options = self.mark_options();
         for mark in &model.marks {
-            paint::feature(&painter, &place, mark, &options);
+            paint::feature(&painter, &place, mark, &self.options);
         }
         if let Some(slide) = context.moved_chain(model.stamp_ns) {
             for (_, [now, moved]) in &slide.predictions_px {
@@ -298,7 +264,7 @@ impl ImagePanel {
         if let Some(mark) = model.marks.iter().find(|mark| Some(mark.id) == context.selection.feature) {
             let at = place.position(&mark.measured_px);
             paint::selection(painter, place, at);
-            if !self.ids {
+            if !self.options.ids {
                 let beside = at + vec2(place.marker_radius() + 8.0, 0.0);
                 paint::label(painter, beside, Align2::LEFT_CENTER, &mark.id.0.to_string());
             }
@@ -351,7 +317,7 @@ fn caption_ui(ui: &mut Ui, context: &PanelContext<'_>, model: &ImageModel) {
 
 /// The mask of the camera of the selected run.
 fn mask_of<'a>(context: &PanelContext<'a>) -> Option<&'a ImageMask> {
-    let key = &context.recording.runs.get(context.selection.run)?.camera_key;
+    let key = &context.selected_run()?.camera_key;
     let camera = context.recording.rig.cameras.iter().find(|camera| camera.key == *key)?;
     camera.mask.as_ref().map(|mask| &mask.image)
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector2;
 
-use crate::estimator::Phase;
+use crate::estimator::{ObservationReport, Phase};
 use crate::frontend::{FeatureId, FrontEndStatistics};
 use crate::geometry::seconds_from_ns;
 use crate::session::RunRecord;
@@ -37,11 +37,8 @@ pub(super) struct FeatureMark {
 /// Result of the solve for a feature.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SolvedMark {
-    /// Predicted minus measured position in this image; `None` in the image that anchors the feature.
-    pub(super) residual_before_px: Option<Vector2<f64>>,
-    pub(super) residual_after_px: Option<Vector2<f64>>,
-    pub(super) chi2: f64,
-    pub(super) robust_weight: f64,
+    /// Its observation in this image.
+    pub(super) observation: Option<ObservationReport>,
     /// Weight of the track as a whole.
     pub(super) track_weight: f64,
     /// True if the observations do not fit one point of the scene.
@@ -52,10 +49,12 @@ pub(super) struct SolvedMark {
 }
 
 impl SolvedMark {
+    /// Predicted minus measured position in this image; `None` in the image that anchors the feature.
     pub(super) fn residual_px(&self, side: SolveSide) -> Option<Vector2<f64>> {
+        let observation = self.observation?;
         match side {
-            SolveSide::Before => self.residual_before_px,
-            SolveSide::After => self.residual_after_px,
+            SolveSide::Before => observation.residual_before_px,
+            SolveSide::After => observation.residual_after_px,
         }
     }
 }
@@ -104,12 +103,9 @@ impl ImageModel {
                     })
                     .collect();
                 let solved = report.features.iter().find(|solved| solved.id == feature.id).map(|solved| {
-                    let here = solved.observations.iter().find(|seen| seen.frame_index == report.frame_index);
+                    let mut observations = solved.observations.iter();
                     SolvedMark {
-                        residual_before_px: here.and_then(|seen| seen.residual_before_px),
-                        residual_after_px: here.and_then(|seen| seen.residual_after_px),
-                        chi2: here.map_or(f64::NAN, |seen| seen.chi2),
-                        robust_weight: here.map_or(f64::NAN, |seen| seen.robust_weight),
+                        observation: observations.find(|seen| seen.frame_index == report.frame_index),
                         track_weight: solved.track_weight(),
                         slides: solved.slides(),
                         depth_m: 1.0 / solved.inverse_depth_per_m,
@@ -191,9 +187,10 @@ pub(super) fn description(mark: &FeatureMark) -> String {
     let residual = |vector: Option<Vector2<f64>>| {
         vector.map_or_else(|| "–".to_owned(), |v| format!("{:.2} px ({:+.2}, {:+.2})", v.norm(), v.x, v.y))
     };
-    lines.push(format!("residual before the solve: {}", residual(solved.residual_before_px)));
-    lines.push(format!("residual after the solve: {}", residual(solved.residual_after_px)));
-    lines.push(format!("χ² {:.2}, robust weight {:.2}", solved.chi2, solved.robust_weight));
+    lines.push(format!("residual before the solve: {}", residual(solved.residual_px(SolveSide::Before))));
+    lines.push(format!("residual after the solve: {}", residual(solved.residual_px(SolveSide::After))));
+    let [chi2, weight] = solved.observation.map_or([f64::NAN; 2], |seen| [seen.chi2, seen.robust_weight]);
+    lines.push(format!("χ² {chi2:.2}, robust weight {weight:.2}"));
     lines.push(format!("depth: {:.2} m, {} observations", solved.depth_m, solved.observation_count));
     lines.push(format!("weight of the track {:.2}", solved.track_weight));
     if solved.slides {

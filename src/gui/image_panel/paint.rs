@@ -52,13 +52,23 @@ impl ImagePlacement {
     }
 }
 
+/// What is drawn over the image.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct MarkOptions {
-    pub(super) side: SolveSide,
+pub(in crate::gui) struct MarkOptions {
+    /// Residuals before or after the solve.
+    pub(in crate::gui) side: SolveSide,
     pub(super) magnification: f32,
     pub(super) residuals: bool,
     pub(super) trails: bool,
     pub(super) ids: bool,
+    /// Tint the pixels that the mask of the camera covers.
+    pub(super) mask: bool,
+}
+
+impl Default for MarkOptions {
+    fn default() -> Self {
+        Self { side: SolveSide::After, magnification: 20.0, residuals: true, trails: true, ids: false, mask: true }
+    }
 }
 
 /// Colour of an age in frames: viridis over the square root, so that young tracks differ most.
@@ -108,10 +118,14 @@ pub(super) fn feature(painter: &Painter, place: &ImagePlacement, mark: &FeatureM
         {
             let reach = residual * f64::from(options.magnification * place.scale());
             let tip = at + vec2(reach.x as f32, reach.y as f32);
-            residual_arrow(painter, at, tip);
+            painter.line_segment([at, tip], Stroke::new(3.0, HALO));
+            residual_arrow(painter, at, tip, ink().runs[1]);
         }
         if solved.rejected {
-            cross(painter, at, marker_radius + 3.0);
+            let arm = (marker_radius + 3.0) * std::f32::consts::FRAC_1_SQRT_2;
+            for stroke in [Stroke::new(4.0, HALO), Stroke::new(2.0, ink().error)] {
+                cross(painter, at, arm, stroke);
+            }
         } else if solved.slides {
             for stroke in [Stroke::new(4.0, HALO), Stroke::new(2.0, ink().warn)] {
                 slash(painter, at, marker_radius + 3.0, stroke);
@@ -142,9 +156,7 @@ fn upright_cross(painter: &Painter, at: Pos2, reach: f32, stroke: Stroke) {
 }
 
 /// Draws a line from the measurement to the (magnified) prediction, with a diamond at its end.
-fn residual_arrow(painter: &Painter, from: Pos2, tip: Pos2) {
-    let color = ink().runs[1];
-    painter.line_segment([from, tip], Stroke::new(3.0, HALO));
+fn residual_arrow(painter: &Painter, from: Pos2, tip: Pos2, color: Color32) {
     painter.line_segment([from, tip], Stroke::new(1.5, color));
     let side = 2.2;
     let diamond = [vec2(side, 0.0), vec2(0.0, side), vec2(-side, 0.0), vec2(0.0, -side)].map(|corner| tip + corner);
@@ -158,12 +170,9 @@ fn slash(painter: &Painter, at: Pos2, radius: f32, stroke: Stroke) {
 }
 
 /// Draws the mark of a rejected feature.
-fn cross(painter: &Painter, at: Pos2, radius: f32) {
-    let arm = radius * std::f32::consts::FRAC_1_SQRT_2;
-    for stroke in [Stroke::new(4.0, HALO), Stroke::new(2.0, ink().error)] {
-        painter.line_segment([at + vec2(-arm, -arm), at + vec2(arm, arm)], stroke);
-        painter.line_segment([at + vec2(-arm, arm), at + vec2(arm, -arm)], stroke);
-    }
+fn cross(painter: &Painter, at: Pos2, arm: f32, stroke: Stroke) {
+    painter.line_segment([at + vec2(-arm, -arm), at + vec2(arm, arm)], stroke);
+    painter.line_segment([at + vec2(-arm, arm), at + vec2(arm, -arm)], stroke);
 }
 
 /// Draws a circle around the selected feature.
@@ -199,28 +208,15 @@ pub(super) fn legend(painter: &Painter, rect: Rect, theme: &Theme, options: &Mar
     pen.symbol("tracked only", |painter, at| {
         painter.circle_filled(at, DOT_RADIUS, theme.text);
     });
-    pen.symbol("rejected", |painter, at| {
-        let arm = 4.0;
-        let stroke = Stroke::new(2.0, theme.error);
-        painter.line_segment([at + vec2(-arm, -arm), at + vec2(arm, arm)], stroke);
-        painter.line_segment([at + vec2(-arm, arm), at + vec2(arm, -arm)], stroke);
-    });
+    pen.symbol("rejected", |painter, at| cross(painter, at, 4.0, Stroke::new(2.0, theme.error)));
     pen.symbol("slides", |painter, at| slash(painter, at, 5.7, Stroke::new(2.0, theme.warn)));
     if options.residuals {
         let name = format!("prediction − measurement, ×{:.0}", options.magnification);
         pen.symbol(&name, |painter, at| {
             painter.circle_stroke(at + vec2(-5.0, 0.0), 2.5, Stroke::new(1.0, theme.text));
-            residual_arrow_plain(painter, at + vec2(-5.0, 0.0), at + vec2(6.0, 0.0), theme);
+            residual_arrow(painter, at + vec2(-5.0, 0.0), at + vec2(6.0, 0.0), theme.runs[1]);
         });
     }
-}
-
-fn residual_arrow_plain(painter: &Painter, from: Pos2, tip: Pos2, theme: &Theme) {
-    let color = theme.runs[1];
-    painter.line_segment([from, tip], Stroke::new(1.5, color));
-    let side = 2.2;
-    let diamond = [vec2(side, 0.0), vec2(0.0, side), vec2(-side, 0.0), vec2(0.0, -side)].map(|corner| tip + corner);
-    painter.add(Shape::convex_polygon(diamond.to_vec(), color, Stroke::NONE));
 }
 
 struct LegendPen<'a> {

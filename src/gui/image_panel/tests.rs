@@ -81,7 +81,9 @@ fn marks_have_the_values_of_the_report() {
     let text = description(rejected);
     assert!(text.contains(&format!("feature {}", rejected.id.0)) && text.contains("outlier, rejected"), "{text}");
     let sliding = model.marks.iter().find(|mark| mark.solved.is_some_and(|solved| solved.slides)).unwrap();
-    assert!(sliding.solved.unwrap().robust_weight < 0.5 && description(sliding).contains("slides"));
+    assert!(
+        sliding.solved.unwrap().observation.unwrap().robust_weight < 0.5 && description(sliding).contains("slides")
+    );
     let fresh = model.marks.iter().find(|mark| mark.solved.is_none()).unwrap();
     assert!(description(fresh).contains("not used in the solve"));
 }
@@ -105,13 +107,13 @@ fn controls_are_found_by_label_and_work() {
         (ImagePanel::default(), Selection::default()),
     );
     harness.run();
-    assert_eq!(harness.state().0.side, SolveSide::After);
+    assert_eq!(harness.state().0.options.side, SolveSide::After);
     harness.get_by_label("Before").click();
     harness.get_by_label("Ids").click();
     harness.get_by_label("Trails").click();
     harness.run();
-    let panel = &harness.state().0;
-    assert_eq!((panel.side, panel.ids, panel.trails), (SolveSide::Before, true, false));
+    let options = harness.state().0.options;
+    assert_eq!((options.side, options.ids, options.trails), (SolveSide::Before, true, false));
     harness.get_by_label_contains("frame 79 · 3.950 s");
 }
 
@@ -203,10 +205,10 @@ fn a_mask_is_tinted_and_can_be_hidden() {
         (ImagePanel::default(), Selection::default()),
     );
     harness.run();
-    assert!(harness.state().0.mask);
+    assert!(harness.state().0.options.mask);
     harness.get_by_label("Mask").click();
     harness.run();
-    assert!(!harness.state().0.mask);
+    assert!(!harness.state().0.options.mask);
 
     let mut tinted = egui::ColorImage::from_gray([width, height], &vec![90; width * height]);
     let plain = tinted.clone();

@@ -26,9 +26,7 @@ pub struct InspectorPanel {
 
 impl Panel for InspectorPanel {
     fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
-        let recording = ctx.recording;
-        let run = ctx.selection.run.min(recording.runs.len().saturating_sub(1));
-        let Some((run, step)) = recording.runs.get(run).and_then(|run| Some((run, run.step_at(ctx.cursor_ns)?))) else {
+        let Some((run, step)) = ctx.selected_step() else {
             empty_ui(ui, "No step at the cursor");
             return;
         };

@@ -55,8 +55,7 @@ pub struct JacobianPanel {
 
 impl Panel for JacobianPanel {
     fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
-        let run = ctx.recording.runs.get(ctx.selection.run.min(ctx.recording.runs.len().saturating_sub(1)));
-        let Some((run, step)) = run.and_then(|run| Some((run, run.step_at(ctx.cursor_ns)?))) else {
+        let Some((run, step)) = ctx.selected_step() else {
             empty_ui(ui, "No step at the cursor");
             return;
         };

@@ -107,13 +107,19 @@ impl Choices {
 
     fn mechanism_ui(&mut self, ui: &mut Ui, ctx: &PanelContext<'_>) {
         let rig = format!("rig {}", ctx.recording.rig.name);
-        let text = |name: &Option<&'static str>| name.map_or_else(|| rig.clone(), str::to_owned);
-        let meaning = |name: &Option<&'static str>| {
-            Mechanism::NAMES.iter().find(|(known, _)| Some(*known) == *name).map_or("", |(_, meaning)| meaning)
-        };
+        let meaning =
+            |name: &str| Mechanism::NAMES.iter().find(|(known, _)| *known == name).map_or("", |known| known.1);
         let names = std::iter::once(None).chain(Mechanism::NAMES.iter().map(|(name, _)| Some(*name)));
-        hinted_choice_ui(ui, "Mechanism", 150.0, &mut self.mechanism, names, text, meaning)
-            .on_hover_text(window::MECHANISM.meaning);
+        let shown = hinted_choice_ui(
+            ui,
+            "Mechanism",
+            150.0,
+            &mut self.mechanism,
+            names,
+            |name| name.map_or_else(|| rig.clone(), str::to_owned),
+            |name| name.map_or("", meaning),
+        );
+        shown.on_hover_text(window::MECHANISM.meaning);
     }
 
     fn motion_ui(&mut self, ui: &mut Ui) {
@@ -135,7 +141,7 @@ impl Choices {
     }
 
     fn mechanism(&self, ctx: &PanelContext<'_>) -> Option<Mechanism> {
-        let run = ctx.recording.runs.get(ctx.selection.run);
+        let run = ctx.selected_run();
         let Some(name) = self.mechanism else {
             let rig = &ctx.recording.rig;
             let key = run.map(|run| &run.camera_key).or_else(|| rig.cameras.first().map(|camera| &camera.key))?;
@@ -156,7 +162,7 @@ impl Choices {
         let mechanism = self.mechanism(ctx).ok_or("No extrinsics of this run's camera in the rig")?;
         let mut setup = LaboratorySetup::new(mechanism);
         if self.mechanism.is_none() {
-            let run = ctx.recording.runs.get(ctx.selection.run);
+            let run = ctx.selected_run();
             let camera = run.and_then(|run| ctx.recording.rig.camera(&run.camera_key).ok());
             setup.camera = camera.map_or(setup.camera, |camera| camera.model.clone());
         }

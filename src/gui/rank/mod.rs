@@ -80,8 +80,7 @@ pub struct RankPanel {
 
 impl Panel for RankPanel {
     fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
-        let recording = ctx.recording;
-        let Some(run) = recording.runs.get(ctx.selection.run.min(recording.runs.len().saturating_sub(1))) else {
+        let Some(run) = ctx.selected_run() else {
             empty_ui(ui, "No runs");
             return;
         };
@@ -100,7 +99,7 @@ impl Panel for RankPanel {
             return;
         }
         if count > 1 && ctx.presentation.is_figure() {
-            let number = ctx.selection.run.min(recording.runs.len().saturating_sub(1));
+            let number = ctx.run_number();
             ui.horizontal(|ui| {
                 ui.label(RichText::new(format!("Run {}", run.spec.label)).strong().color(ctx.theme.run(number).color));
                 ui.add_space(16.0);
@@ -213,7 +212,7 @@ impl RankPanel {
             spectrum::ui(ui, &theme, &names, rank, height);
         });
         self.information.ui(ui, ctx, run, step);
-        let number = ctx.selection.run.min(ctx.recording.runs.len().saturating_sub(1));
+        let number = ctx.run_number();
         compare::singularity_ui(ui, ctx, number, run, step);
         section_ui(ui, &theme, presentation, "Ranks over time", OVER_TIME_HEIGHT, |ui| self.over_time_ui(ui, ctx));
         self.advice.alternatives_ui(ui, ctx);

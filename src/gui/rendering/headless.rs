@@ -29,7 +29,7 @@ pub struct HeadlessOptions {
 
 /// Output of egui for one frame.
 pub struct PaintedFrame {
-    /// Meshes, in points.
+    /// Meshes of the frame, in points.
     pub chunks: Vec<Arc<Chunk>>,
     /// New, changed and freed textures.
     pub textures: TexturesDelta,

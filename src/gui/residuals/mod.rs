@@ -68,9 +68,7 @@ pub struct ResidualsPanel {
 
 impl Panel for ResidualsPanel {
     fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
-        let recording = ctx.recording;
-        let run = ctx.selection.run.min(recording.runs.len().saturating_sub(1));
-        let Some(step) = recording.runs.get(run).and_then(|run| run.step_at(ctx.cursor_ns)) else {
+        let Some((run, step)) = ctx.selected_step() else {
             empty_ui(ui, "No step at the cursor");
             return;
         };
@@ -81,7 +79,7 @@ impl Panel for ResidualsPanel {
         if room.x >= MIN_SIZE_FOR_BOTH.x && room.y >= MIN_SIZE_FOR_BOTH.y {
             ui.columns(2, |columns| {
                 self.distribution_ui(&mut columns[0], ctx, step);
-                self.image_plane.ui(&mut columns[1], ctx, &recording.runs[run], step, room.y - 4.0);
+                self.image_plane.ui(&mut columns[1], ctx, run, step, room.y - 4.0);
             });
             return;
         }
@@ -97,7 +95,7 @@ impl Panel for ResidualsPanel {
             ResidualView::Distribution => self.distribution_ui(ui, ctx, step),
             ResidualView::ImagePlane => {
                 let height = ui.available_height() - 4.0;
-                self.image_plane.ui(ui, ctx, &recording.runs[run], step, height);
+                self.image_plane.ui(ui, ctx, run, step, height);
             }
         }
     }

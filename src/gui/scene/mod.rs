@@ -57,20 +57,27 @@ const CLOSE_UP_FROM: Vec2 = vec2(280.0, 160.0);
 /// Height in points of title and chain above a table of links, at least.
 const MIN_CHAIN_HEIGHT: f32 = 150.0;
 
-/// State of the scene panel: options and viewpoints.
-pub struct ScenePanel {
-    pub follow: Follow,
-    pub landmarks: bool,
-    /// Show camera frusta of the keyframes in the window.
-    pub keyframes: bool,
-    /// Show the newest image in the camera's frustum.
-    pub image: bool,
-    pub chain: bool,
-    /// Show three standard deviations of the position around the trajectory of the selected run.
-    pub tube: bool,
+/// What the scene shows, and from where.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::gui) struct SceneLook {
+    follow: Follow,
+    chain: bool,
+    options: WorldOptions,
     world: Orbit,
     /// Viewpoint of the close-up, `None` before the user has rotated it.
     close_up: Option<Orbit>,
+}
+
+impl Default for SceneLook {
+    fn default() -> Self {
+        let options = WorldOptions { landmarks: true, keyframes: true, image: true, tube: true };
+        Self { follow: Follow::Trajectory, chain: true, options, world: default_world_orbit(), close_up: None }
+    }
+}
+
+/// State of the scene panel: options and viewpoints.
+pub struct ScenePanel {
+    pub(in crate::gui) look: SceneLook,
     /// Position of the close-up; see [`close_up_rect`].
     close_up_place: Vec2,
     world_canvas: Canvas,
@@ -81,14 +88,7 @@ pub struct ScenePanel {
 impl Default for ScenePanel {
     fn default() -> Self {
         Self {
-            follow: Follow::Trajectory,
-            landmarks: true,
-            keyframes: true,
-            image: true,
-            chain: true,
-            tube: true,
-            world: default_world_orbit(),
-            close_up: None,
+            look: SceneLook::default(),
             close_up_place: Vec2::splat(1.0),
             world_canvas: Canvas::new("world"),
             close_up_canvas: Canvas::new("close-up"),
@@ -111,7 +111,7 @@ impl Panel for ScenePanel {
         response.widget_info(|| WidgetInfo::labeled(Role::Image, true, "View of the scene"));
         let area = on_pixels(area, ui.pixels_per_point());
         let has_room = area.width() >= CLOSE_UP_FROM.x && area.height() >= CLOSE_UP_FROM.y;
-        let chain = (self.chain && has_room).then(|| chain_model(context)).flatten();
+        let chain = (self.look.chain && has_room).then(|| chain_model(context)).flatten();
         let close_up = chain.as_ref().map(|_| close_up_rect(area, self.close_up_place, ui.pixels_per_point()));
         self.world_ui(ui, area, close_up, &response, context);
         if let (Some(chain), Some(rect)) = (chain, close_up) {
@@ -123,50 +123,32 @@ impl Panel for ScenePanel {
     }
 
     fn view_copy(&self) -> Self {
-        let Self { follow, landmarks, keyframes, image, chain, tube, world, close_up, close_up_place, .. } = *self;
-        Self { follow, landmarks, keyframes, image, chain, tube, world, close_up, close_up_place, ..Self::default() }
+        Self { look: self.look, close_up_place: self.close_up_place, ..Self::default() }
     }
 }
 
 impl ScenePanel {
-    /// Copies options and viewpoint of another panel.
-    pub(in crate::gui) fn follow(&mut self, other: &Self) {
-        let Self { follow, landmarks, keyframes, image, chain, tube, world, close_up, .. } = *other;
-        (self.follow, self.world, self.close_up) = (follow, world, close_up);
-        (self.landmarks, self.keyframes, self.image) = (landmarks, keyframes, image);
-        (self.chain, self.tube) = (chain, tube);
-    }
-
-    /// True if options and viewpoint equal those of another panel.
-    pub(in crate::gui) fn looks_like(&self, other: &Self) -> bool {
-        let look = |panel: &Self| {
-            let Self { follow, landmarks, keyframes, image, chain, tube, world, close_up, .. } = *panel;
-            (follow, landmarks, keyframes, image, chain, tube, world, close_up)
-        };
-        look(self) == look(other)
-    }
-
     fn controls_ui(&mut self, ui: &mut Ui) {
         ui.horizontal_wrapped(|ui| {
-            ui.selectable_value(&mut self.follow, Follow::Trajectory, "Trajectory")
+            ui.selectable_value(&mut self.look.follow, Follow::Trajectory, "Trajectory")
                 .on_hover_text("View of all trajectories");
-            ui.selectable_value(&mut self.follow, Follow::Vehicle, "Vehicle")
+            ui.selectable_value(&mut self.look.follow, Follow::Vehicle, "Vehicle")
                 .on_hover_text("View that follows the vehicle");
             if ui.button("Fit").on_hover_text("Reset the view (double-click)").clicked() {
-                self.world = default_world_orbit();
-                self.close_up = None;
+                self.look.world = default_world_orbit();
+                self.look.close_up = None;
             }
             if ui.button("Top").on_hover_text("View from above").clicked() {
-                self.world = Orbit::from_direction(Vector3::new(0.0, -0.01, 1.0));
+                self.look.world = Orbit::from_direction(Vector3::new(0.0, -0.01, 1.0));
             }
             ui.separator();
-            ui.checkbox(&mut self.landmarks, "Landmarks")
+            ui.checkbox(&mut self.look.options.landmarks, "Landmarks")
                 .on_hover_text("Landmarks of the shown run, coloured by height");
-            ui.checkbox(&mut self.keyframes, "Keyframes").on_hover_text("Camera frusta of the keyframes in the window");
-            ui.checkbox(&mut self.image, "Image").on_hover_text("The image of the shown run inside of its frustum");
-            ui.checkbox(&mut self.tube, "±3σ")
+            ui.checkbox(&mut self.look.options.keyframes, "Keyframes").on_hover_text("Camera frusta of the keyframes in the window");
+            ui.checkbox(&mut self.look.options.image, "Image").on_hover_text("The image of the shown run inside of its frustum");
+            ui.checkbox(&mut self.look.options.tube, "±3σ")
                 .on_hover_text("Three standard deviations of the position around the trajectory of the shown run, relative to its first frame");
-            ui.checkbox(&mut self.chain, "Chain").on_hover_text("The gimbal chain as an inset");
+            ui.checkbox(&mut self.look.chain, "Chain").on_hover_text("The gimbal chain as an inset");
         });
     }
 
@@ -193,25 +175,23 @@ impl ScenePanel {
         // the landmarks.
         let key = overlay::LINE_HEIGHT * (views.len() + lanes.len() + 2) as f32;
         let viewport = world_viewport(area, close_up, key.min(0.22 * area.height()), scale);
-        let mut framing = frame(&points, self.world.towards, &viewport);
-        if self.follow == Follow::Vehicle
+        let mut framing = frame(&points, self.look.world.towards, &viewport);
+        if self.look.follow == Follow::Vehicle
             && let Some(at) = views.get(context.selection.run).and_then(RunView::position_m)
         {
             framing = OrbitCamera { target_m: at, distance_m: framing.distance_m * VEHICLE_DISTANCE_RATIO, ..framing };
         }
-        let view = SceneView::new(self.world.applied(framing), viewport);
+        let view = SceneView::new(self.look.world.applied(framing), viewport);
         let mut lines = legend_lines(&views, &lanes, context.cursor_ns, context.recording.truth_name(), theme);
         if context.recording.position_truth.is_some() {
             let text = "ground truth, positions of the antenna".to_owned();
             lines.push(LegendLine { style: theme.ground_truth_style(), text });
         }
         describe(response, &lines.iter().map(|line| line.text.as_str()).collect::<Vec<_>>().join(", "));
-        navigate(ui, response, &mut self.world, default_world_orbit(), &view);
-        let view = SceneView::new(self.world.applied(framing), viewport);
+        navigate(ui, response, &mut self.look.world, default_world_orbit(), &view);
+        let view = SceneView::new(self.look.world.applied(framing), viewport);
 
-        let options =
-            WorldOptions { landmarks: self.landmarks, keyframes: self.keyframes, image: self.image, tube: self.tube };
-        let mut builder = WorldBuilder::new(theme, options, view.camera.distance_m);
+        let mut builder = WorldBuilder::new(theme, self.look.options, view.camera.distance_m);
         let spacing_m = builder.ground(&points);
         if let Some(first) = views.first() {
             builder.ground_truth(first);
@@ -225,7 +205,7 @@ impl ScenePanel {
         for run in &views {
             let camera = camera_of(&context.recording.rig, run.run);
             let is_selected = run.number == context.selection.run;
-            let image = (is_selected && self.image)
+            let image = (is_selected && self.look.options.image)
                 .then(|| run.newest())
                 .flatten()
                 .and_then(|frame| context.images.image(&run.run.camera_key, frame.frame_index).ready());
@@ -276,17 +256,17 @@ impl ScenePanel {
         let view_rect = on_pixels(view_rect, scale);
         let viewport = Viewport::close_up(size_px(view_rect, scale));
         let home = Orbit::from_direction(close_up_direction(context));
-        let mut orbit = self.close_up.unwrap_or(home);
+        let mut orbit = self.look.close_up.unwrap_or(home);
         let framing = frame(&chain.framing_points_m(), orbit.towards, &viewport);
         let view = SceneView::new(orbit.applied(framing), viewport);
         navigate(ui, &response, &mut orbit, home, &view);
-        self.close_up = (orbit != home).then_some(orbit);
+        self.look.close_up = (orbit != home).then_some(orbit);
         let view = SceneView::new(orbit.applied(framing), viewport);
         let drawing = lay_out(&chain.scene(theme), &view, scale, theme.surface);
         let drawing = self.close_up_canvas.show(ui, view_rect, drawing);
         overlay::labels(&painter, view_rect, scale, &drawing.labels, theme.surface);
         overlay::scale_bar(&painter, view_rect, scale, theme, &view, "");
-        let label = context.recording.runs.get(context.selection.run).map_or("", |run| run.spec.label.as_str());
+        let label = context.selected_run().map_or("", |run| run.spec.label.as_str());
         let kind = if chain.has_joints() { "Gimbal chain" } else { "Extrinsics" };
         let text = match &chain.ground_truth {
             Some(_) if chain.moved => format!("{kind}, {label}, moved; estimate dashed"),
@@ -359,8 +339,7 @@ fn legend_lines(
 
 /// The chain of the selected run at the cursor.
 fn chain_model(context: &PanelContext<'_>) -> Option<ChainModel> {
-    let run = context.recording.runs.get(context.selection.run)?;
-    let step = run.step_at(context.cursor_ns)?;
+    let (run, step) = context.selected_step()?;
     let estimate = &step.report.calibration.classical;
     let joint_names = context.recording.rig.joint_names();
     let angles_rad = step.report.newest().map_or(&[][..], |frame| &frame.joint_angles_rad);
@@ -375,7 +354,7 @@ fn chain_model(context: &PanelContext<'_>) -> Option<ChainModel> {
 
 /// Direction of the close-up's viewpoint, from the rig's chain, so that it does not depend on the cursor.
 fn close_up_direction(context: &PanelContext<'_>) -> Vector3<f64> {
-    let camera_key = context.recording.runs.get(context.selection.run).map_or("", |run| run.camera_key.as_str());
+    let camera_key = context.selected_run().map_or("", |run| run.camera_key.as_str());
     ChainPose::best_direction(&context.recording.rig.chain_of_camera(camera_key).unwrap_or_default())
 }
 

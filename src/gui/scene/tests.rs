@@ -256,11 +256,11 @@ fn controls_are_found_by_label_and_work() {
     }
     harness.run();
     let panel = harness.state();
-    assert_eq!((panel.follow, panel.landmarks, panel.chain), (Follow::Vehicle, false, false));
-    assert!(panel.world.towards.z > 0.99);
+    assert_eq!((panel.look.follow, panel.look.options.landmarks, panel.look.chain), (Follow::Vehicle, false, false));
+    assert!(panel.look.world.towards.z > 0.99);
     harness.get_by_label("Fit").click();
     harness.run();
-    assert_eq!(harness.state().world, super::default_world_orbit());
+    assert_eq!(harness.state().look.world, super::default_world_orbit());
 }
 
 #[test]
@@ -271,14 +271,14 @@ fn dragging_rotates_the_view_and_a_double_click_resets_it() {
         ScenePanel::default(),
     );
     harness.run();
-    let home = harness.state().world;
+    let home = harness.state().look.world;
     harness.drag_at(egui::pos2(200.0, 300.0));
     harness.run();
     harness.hover_at(egui::pos2(260.0, 330.0));
     harness.run();
     harness.drop_at(egui::pos2(260.0, 330.0));
     harness.run();
-    let rotated = harness.state().world;
+    let rotated = harness.state().look.world;
     assert!(rotated.towards.dot(&home.towards) < 0.95, "{rotated:?}");
     assert!(rotated.towards.z > home.towards.z, "dragging down looks from higher up");
     assert_eq!(rotated.shift_m, home.shift_m);
@@ -289,7 +289,8 @@ fn screenshots_repeat_and_every_stamp_can_be_drawn() {
     let recording = sample_recording();
     let options = |theme| HeadlessOptions { size_px: [780, 480], pixels_per_point: 1.0, theme };
     let screenshot = |cursor_ns, theme, follow| {
-        let mut panel = ScenePanel { follow, ..ScenePanel::default() };
+        let mut panel = ScenePanel::default();
+        panel.look.follow = follow;
         draw(options(theme), |ui| show(ui, &mut panel, &recording, cursor_ns, theme))
     };
     for theme in [ThemeName::Dark, ThemeName::Light, ThemeName::Print] {

@@ -27,8 +27,11 @@ const MAX_LANDMARKS: usize = 20_000;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct WorldOptions {
     pub(super) landmarks: bool,
+    /// Show camera frusta of the keyframes in the window.
     pub(super) keyframes: bool,
+    /// Show the newest image in the camera's frustum.
     pub(super) image: bool,
+    /// Show three standard deviations of the position around the trajectory of the selected run.
     pub(super) tube: bool,
 }
 

@@ -6,7 +6,7 @@ use crate::study::{ColumnType, StudyTable};
 
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum AxisScale {
-    /// A numeric scale.
+    /// Numbers on a linear or logarithmic scale.
     Values(ValueAxis),
     /// Texts in this order from below, at equal distances.
     Names(Vec<String>),

@@ -8,7 +8,7 @@ use super::context::StudyRequest;
 use super::model::{StudyModel, TypedCondition, shown_group};
 use crate::gui::theme::Theme;
 use crate::gui::units::counted;
-use crate::study::view::Study;
+use crate::study::view::{Metric, Study};
 
 /// Draws the bar and applies the choices.
 pub(super) fn ui(
@@ -78,65 +78,61 @@ fn condition_ui(
 }
 
 fn group_ui(ui: &mut Ui, model: &mut StudyModel) {
-    ui.label("Group");
-    let mut chosen = None;
-    let none = "none";
-    let combo = ComboBox::from_id_salt("group").selected_text(model.group().unwrap_or(none).to_owned());
-    let shown = combo.show_ui(ui, |ui| {
-        if ui.selectable_label(model.group().is_none(), none).clicked() {
-            chosen = Some(None);
-        }
-        for column in &model.group_columns {
-            if ui.selectable_label(model.group() == Some(column), column).clicked() {
-                chosen = Some(Some(column.clone()));
-            }
-        }
-    });
-    shown.response.widget_info(|| WidgetInfo::labeled(egui::Role::ComboBox, true, "Group by"));
-    shown.response.on_hover_text("Column whose values make the groups of all plots");
-    if let Some(group) = chosen {
-        model.set_group(group);
+    const NONE: &str = "none";
+    let group = model.group();
+    let columns = model.group_columns.iter().map(|column| (group == Some(column), column.clone(), ""));
+    let entries = std::iter::once((group.is_none(), NONE.to_owned(), "")).chain(columns);
+    let hover = "Column whose values make the groups of all plots";
+    if let Some(place) = list_ui(ui, ("Group", "Group by", hover), group.unwrap_or(NONE), entries) {
+        let chosen = place.checked_sub(1).and_then(|place| model.group_columns.get(place)).cloned();
+        model.set_group(chosen);
     }
 }
 
 fn metric_ui(ui: &mut Ui, model: &mut StudyModel) {
     let Some(metric) = model.metric() else { return };
-    ui.label("Metric");
-    let mut chosen = None;
-    let combo = ComboBox::from_id_salt("metric").selected_text(metric.title());
-    let shown = combo.height(400.0).show_ui(ui, |ui| {
-        for (place, known) in model.metrics.iter().enumerate() {
-            let on = known.column == metric.column;
-            if ui.selectable_label(on, known.title()).on_hover_text(&known.description).clicked() {
-                chosen = Some(place);
-            }
-        }
-    });
-    shown.response.widget_info(|| WidgetInfo::labeled(egui::Role::ComboBox, true, "Metric"));
-    shown.response.on_hover_text(&metric.description);
-    if let Some(place) = chosen {
+    let of = |known: &Metric| known.column == metric.column;
+    let entries = model.metrics.iter().map(|known| (of(known), known.title(), known.description.as_str()));
+    if let Some(place) = list_ui(ui, ("Metric", "Metric", &metric.description), &metric.title(), entries) {
         model.set_metric(place);
     }
 }
 
 fn reference_ui(ui: &mut Ui, model: &mut StudyModel) {
-    let (Some(group), Some(reference)) = (model.group().map(str::to_owned), model.reference().map(str::to_owned))
-    else {
-        return;
-    };
-    ui.label("Reference");
+    let (Some(group), Some(reference)) = (model.group(), model.reference()) else { return };
+    let name = |name: &str| shown_group(name, Some(group));
+    let groups = &model.arranged.groups;
+    let entries = groups.iter().map(|of| (of.name == reference, name(&of.name), ""));
+    let hover = "Group from which the paired differences are measured";
+    let chosen = list_ui(ui, ("Reference", "Reference group", hover), &name(reference), entries);
+    if let Some(name) = chosen.map(|place| groups[place].name.clone()) {
+        model.set_reference(name);
+    }
+}
+
+/// Draws a labelled list of entries: whether it is the current one, its text and its hint. Returns the place of the
+/// clicked one. `names` are the label, the name for screen readers and the hint of the list.
+fn list_ui<'a>(
+    ui: &mut Ui,
+    names: (&str, &str, &str),
+    current: &str,
+    entries: impl Iterator<Item = (bool, String, &'a str)>,
+) -> Option<usize> {
+    let (label, spoken, hover) = names;
+    ui.label(label);
     let mut chosen = None;
-    let name = |name: &str| shown_group(name, Some(&group));
-    let shown = ComboBox::from_id_salt("reference").selected_text(name(&reference)).show_ui(ui, |ui| {
-        for of in &model.arranged.groups {
-            if ui.selectable_label(of.name == reference, name(&of.name)).clicked() {
-                chosen = Some(of.name.clone());
+    let shown = ComboBox::from_id_salt(label).selected_text(current).height(400.0).show_ui(ui, |ui| {
+        for (place, (on, text, hint)) in entries.enumerate() {
+            let mut entry = ui.selectable_label(on, text);
+            if !hint.is_empty() {
+                entry = entry.on_hover_text(hint);
+            }
+            if entry.clicked() {
+                chosen = Some(place);
             }
         }
     });
-    shown.response.widget_info(|| WidgetInfo::labeled(egui::Role::ComboBox, true, "Reference group"));
-    shown.response.on_hover_text("Group from which the paired differences are measured");
-    if let Some(reference) = chosen {
-        model.set_reference(reference);
-    }
+    shown.response.widget_info(|| WidgetInfo::labeled(egui::Role::ComboBox, true, spoken));
+    shown.response.on_hover_text(hover);
+    chosen
 }

@@ -33,7 +33,7 @@ impl Named for ThemeName {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RunStyle {
-    /// Okabe–Ito colour.
+    /// Colour of the Okabe–Ito palette.
     pub color: Color32,
     /// Lengths of dash, gap, dash, gap, … in points; empty for a solid line.
     pub dashes: &'static [f32],
@@ -71,7 +71,7 @@ pub const HAIRLINE_WIDTH: f32 = 1.0;
 pub struct Theme {
     pub name: ThemeName,
     pub background: Color32,
-    /// Background of panels.
+    /// Background of panels and bars.
     pub surface: Color32,
     /// Background of buttons and header rows.
     pub surface_raised: Color32,
@@ -83,9 +83,9 @@ pub struct Theme {
     /// Hatching of ranges without information.
     pub hatch: Color32,
     pub text: Color32,
-    /// Headings and values.
+    /// Text of headings and values.
     pub text_strong: Color32,
-    /// Labels, units, axes.
+    /// Text of labels, units and axes.
     pub text_weak: Color32,
     /// Selection, focus and links.
     pub accent: Color32,

@@ -108,7 +108,7 @@ impl Panel for TimelinePanel {
 
         register(ui, &area, "");
         let id = ui.unique_id().with("timeline");
-        let value = self.value_text(ctx);
+        let value = value_text(ctx);
         let origin = ui.input(|input| input.pointer.press_origin());
         let on_rows = self.parameters.rows_rect.filter(|rows| origin.is_some_and(|origin| rows.contains(origin)));
         let (clicks, wheel) = (if on_rows.is_some() { Clicks::Brush } else { Clicks::Scrub }, Wheel::Zooms);
@@ -216,7 +216,7 @@ impl TimelinePanel {
                 lanes::warnings(&inner, &theme, &area, &stamps_ns, &self.runs);
             }
         }
-        let selected = ctx.selection.run.min(self.runs.len().saturating_sub(1));
+        let selected = ctx.run_number();
         let value = self.runs.get(selected).and_then(|run| lane.value(run, ctx.cursor_ns));
         let color = match lane {
             Lane::Run(run) => theme.run(run).color,
@@ -234,17 +234,6 @@ impl TimelinePanel {
         label.widget_info(|| WidgetInfo::labeled(Role::Label, true, &text));
         label.on_hover_text(format!("{}\n{}", lane.name(ctx), lane.meaning()));
         axis
-    }
-
-    /// Position of the cursor, the frame there, and the visible range.
-    fn value_text(&self, ctx: &PanelContext<'_>) -> String {
-        let run = ctx.recording.runs.get(ctx.selection.run.min(self.runs.len().saturating_sub(1)));
-        let step = run.and_then(|run| run.step_at(ctx.cursor_ns));
-        let cursor = Some(format!("cursor {} s", seconds(ctx.cursor_ns)));
-        let frame = step.map(|step| format!("frame {}", step.report.frame_index));
-        let range = ctx.selection.visible_ns;
-        let visible = range.map(|(begin, end)| format!("visible {} to {} s", seconds(begin), seconds(end)));
-        [cursor, frame, visible].into_iter().flatten().collect::<Vec<_>>().join(", ")
     }
 
     /// Shift and drag sets the loop range.
@@ -312,6 +301,16 @@ impl TimelinePanel {
         offer(ui, text.clone());
         response.on_hover_text_at_pointer(text);
     }
+}
+
+/// Position of the cursor, the frame there, and the visible range.
+fn value_text(ctx: &PanelContext<'_>) -> String {
+    let step = ctx.selected_step().map(|(_, step)| step);
+    let cursor = Some(format!("cursor {} s", seconds(ctx.cursor_ns)));
+    let frame = step.map(|step| format!("frame {}", step.report.frame_index));
+    let range = ctx.selection.visible_ns;
+    let visible = range.map(|(begin, end)| format!("visible {} to {} s", seconds(begin), seconds(end)));
+    [cursor, frame, visible].into_iter().flatten().collect::<Vec<_>>().join(", ")
 }
 
 /// Exposes the timeline to a screen reader as a slider: its value is the cursor in seconds, its step one frame.

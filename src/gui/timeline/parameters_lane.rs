@@ -12,7 +12,6 @@ use crate::gui::PanelContext;
 use crate::gui::flight::DeterminationHistory;
 use crate::gui::plot::PlotArea;
 use crate::observability::Determination;
-use crate::session::RunRecord;
 
 #[derive(Debug, Default)]
 pub(super) struct ParametersLane {
@@ -26,20 +25,16 @@ pub(super) struct ParametersLane {
     stretch: Option<TimelineStretch>,
 }
 
-fn selected_run<'a>(ctx: &PanelContext<'a>) -> Option<&'a RunRecord> {
-    ctx.recording.runs.get(ctx.selection.run.min(ctx.recording.runs.len().saturating_sub(1)))
-}
-
 /// Verdicts of the selected run over time.
 pub(super) fn history(ui: &Ui, ctx: &PanelContext<'_>) -> Option<Arc<DeterminationHistory>> {
-    Some(ctx.flight(ui, selected_run(ctx)?).history)
+    Some(ctx.flight(ui, ctx.selected_run()?).history)
 }
 
 impl ParametersLane {
     /// Draws the map of the parameters, with names and legend if its rows are open; a click on its name opens them.
     pub(super) fn ui(&mut self, ui: &Ui, ctx: &mut PanelContext<'_>, area: PlotArea, label_rect: Rect) {
         let theme = *ctx.theme;
-        let Some((run, history)) = selected_run(ctx).zip(history(ui, ctx)) else { return };
+        let Some((run, history)) = ctx.selected_run().zip(history(ui, ctx)) else { return };
         self.levels.update(&area, run.id, &history);
         let painter = ui.painter_at(area.rect);
         let (mut rows, mut heading) = (area.rect, label_rect);
@@ -96,7 +91,7 @@ impl ParametersLane {
         if ui.input(|input| input.pointer.primary_down()) && self.stretch.is_none() {
             return;
         }
-        let Some(run) = selected_run(ctx) else { return };
+        let Some(run) = ctx.selected_run() else { return };
         if !self.stretch.as_ref().is_some_and(|known| known.is_of(run, range_ns)) {
             self.stretch = TimelineStretch::read(run, range_ns, &ctx.recording.rig.joint_names());
         }

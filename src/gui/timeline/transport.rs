@@ -105,7 +105,7 @@ fn time_ui(ui: &mut Ui, ctx: &PanelContext<'_>) {
     ui.add_space(5.0);
     let duration = RichText::new(format!("of {} s", seconds(ctx.recording.duration_ns))).monospace();
     ui.label(duration.color(theme.text_weak)).on_hover_text(window::DURATION.meaning);
-    let run = ctx.recording.runs.get(ctx.selection.run.min(ctx.recording.runs.len().saturating_sub(1)));
+    let run = ctx.selected_run();
     if let Some(step) = run.and_then(|run| run.step_at(ctx.cursor_ns)) {
         ui.add_space(8.0);
         ui.label(RichText::new("frame").color(theme.text_weak)).on_hover_text(window::FRAME.meaning);

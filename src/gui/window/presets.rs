@@ -14,7 +14,6 @@ pub enum Preset {
     Calibration,
     /// Image and residuals large.
     FrontEnd,
-    /// Scene large.
     Scene,
     /// Comparison of all runs large.
     Comparison,

@@ -46,7 +46,7 @@ pub(super) fn ui(
     requests: &mut Vec<WindowRequest>,
 ) {
     let theme = *ctx.theme;
-    let run = ctx.recording.runs.get(ctx.selection.run.min(ctx.recording.runs.len().saturating_sub(1)));
+    let run = ctx.selected_run();
     ui.horizontal_centered(|ui| {
         ui.spacing_mut().item_spacing.x = 5.0;
         let mut fields = Vec::new();

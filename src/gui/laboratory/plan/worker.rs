@@ -14,7 +14,7 @@ use crate::simulation::MotionSplines;
 /// Number of trials of a search between two messages.
 const TRIALS_PER_MESSAGE: usize = 8;
 
-/// Motion to predict.
+/// Motion whose σ is asked for.
 #[derive(Clone, Debug)]
 struct PredictionRequest {
     problem: Arc<MotionProblem>,
@@ -145,7 +145,7 @@ pub(super) enum PlanSearch {
 
 /// State of a search.
 pub(super) enum SearchState {
-    /// A better motion.
+    /// A better motion than those before.
     Running(MotionSplines),
     /// The result; `None` if a number is not finite.
     Done(Option<MotionSplines>),

@@ -22,7 +22,7 @@ const ENDING_BITS: u64 = 7;
 /// A shape with more points or vertices is a separate chunk.
 const MANY_POINTS: usize = 64;
 
-/// Consecutive shapes, tessellated.
+/// Consecutive shapes of a frame, tessellated.
 pub struct Chunk {
     /// Meshes in points, and primitives that the graphics adapter paints itself.
     pub primitives: Vec<ClippedPrimitive>,

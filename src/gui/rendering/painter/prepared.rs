@@ -74,7 +74,7 @@ pub(super) struct PreparedChunk {
     /// Vertices of each mesh; `None` for a mesh that is not painted.
     snapped: Vec<Option<Snapped>>,
     views: Vec<TextureView>,
-    /// Ordered by tile.
+    /// Parts of primitives, ordered by tile.
     shares: Vec<Share>,
     /// By share, in the order of painting.
     pieces: Vec<Piece>,

@@ -75,7 +75,6 @@ pub(super) enum TexelKind {
     Coverage,
     /// Alpha 255: an image.
     Opaque,
-    /// No common property.
     Mixed,
 }
 

@@ -177,7 +177,7 @@ impl Plane {
     }
 }
 
-/// Four linear channels.
+/// Four channels that are linear over a triangle.
 pub(super) struct Gradient {
     at_corner: [f64; 4],
     per_column: [f64; 4],

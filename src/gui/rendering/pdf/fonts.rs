@@ -37,7 +37,7 @@ pub(super) struct FontGlyph {
     pub(super) font: usize,
     /// Number of the embedded glyph.
     pub(super) glyph: u16,
-    /// Width in em.
+    /// Width of the glyph in em.
     pub(super) width: f32,
     /// Size of the font relative to that of the text.
     pub(super) scale: f32,

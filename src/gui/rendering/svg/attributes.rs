@@ -4,7 +4,6 @@ use std::fmt::{Arguments, Write as _};
 
 use egui::{Color32, Pos2, Stroke};
 
-/// Appends formatted text.
 pub(super) fn put(text: &mut String, piece: Arguments<'_>) {
     text.write_fmt(piece).expect("writing into a string cannot fail");
 }

@@ -4,7 +4,6 @@
 
 mod attributes;
 mod document;
-mod symbols;
 #[cfg(test)]
 mod tests;
 mod text;

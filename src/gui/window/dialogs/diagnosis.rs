@@ -17,8 +17,8 @@ const LISTED: usize = 4;
 /// Draws the dialog; starts the diagnosis of the shown run unless it is there. Returns true if the dialog stays open.
 pub(super) fn ui(ui: &Ui, ctx: &mut PanelContext<'_>) -> bool {
     let theme = *ctx.theme;
-    let number = ctx.selection.run.min(ctx.recording.runs.len().saturating_sub(1));
-    let Some(run) = ctx.recording.runs.get(number) else { return false };
+    let number = ctx.run_number();
+    let Some(run) = ctx.selected_run() else { return false };
     let progress = ctx.playback.diagnosis.clone().filter(|progress| progress.run == run.id);
     let title = format!("Diagnosis of {}", run.spec.label);
     let modal = Modal { name: "diagnosis", title: &title, width: 560.0 };

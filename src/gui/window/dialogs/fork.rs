@@ -23,7 +23,6 @@ const JOINT_NOISE: &str = "joint-noise";
 pub(super) struct ForkDialog {
     /// Index in the list; 0 for the parent's parameterization.
     choice: usize,
-    /// Switches and factors.
     changes: ForkChanges,
     /// Values of the other keys, as typed.
     texts: BTreeMap<&'static str, String>,
@@ -37,7 +36,7 @@ impl ForkDialog {
         Self { texts: [(key, value)].into(), ..Self::default() }
     }
 
-    /// Changes as text.
+    /// Changes as text, for the command.
     fn written(&self) -> String {
         let mut parts = Vec::new();
         if let Some(choice) = self.choice.checked_sub(1).and_then(|index| FORK_PARAMETERIZATIONS.get(index)) {
@@ -72,8 +71,8 @@ impl ForkDialog {
     /// Draws the dialog and pushes the command that forks the run. Returns true if it stays open.
     pub(super) fn ui(&mut self, ui: &Ui, ctx: &mut PanelContext<'_>) -> bool {
         let theme = *ctx.theme;
-        let run = ctx.selection.run.min(ctx.recording.runs.len().saturating_sub(1));
-        let parent = ctx.recording.runs.get(run).map_or_else(String::new, |run| run.spec.label.clone());
+        let run = ctx.run_number();
+        let parent = ctx.selected_run().map_or_else(String::new, |run| run.spec.label.clone());
         let title = format!("Fork {parent} at {} s", seconds(ctx.cursor_ns));
         let modal = Modal { name: "fork", title: &title, width: 470.0 };
         let contents = modal.ui(ui, &theme, |ui| {
@@ -182,8 +181,7 @@ fn labelled() -> impl Iterator<Item = (&'static Key<ForkChanges>, &'static Label
 
 /// Keys of the sensor parameters that the run at the cursor can estimate: those of the IMU on the gimbal only if it has one.
 fn sensors_of(ctx: &PanelContext<'_>) -> Vec<&'static str> {
-    let run = ctx.recording.runs.get(ctx.selection.run);
-    let newest = run.and_then(|run| run.step_at(ctx.cursor_ns)).and_then(|step| step.report.newest());
+    let newest = ctx.selected_step().and_then(|(_, step)| step.report.newest());
     let has_gimbal_imu = newest.is_some_and(|newest| newest.gimbal_imu.is_some());
     let known = SensorParameters::ALL.into_iter();
     known.filter(|it| *it != SensorParameters::GimbalImu || has_gimbal_imu).map(SensorParameters::key).collect()
@@ -191,8 +189,7 @@ fn sensors_of(ctx: &PanelContext<'_>) -> Vec<&'static str> {
 
 /// The second camera of the shown run.
 fn second_camera(ctx: &PanelContext<'_>) -> Option<String> {
-    let run = ctx.recording.runs.get(ctx.selection.run)?;
-    let step = run.step_at(ctx.cursor_ns)?;
+    let (_, step) = ctx.selected_step()?;
     step.report.calibration.rigid_cameras.first().map(|(key, _)| key.clone())
 }
 

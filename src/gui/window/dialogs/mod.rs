@@ -10,10 +10,9 @@ mod modal;
 mod open_log;
 mod palette;
 mod palette_items;
-mod remove_run;
+mod questions;
 mod settings;
 pub(super) mod state;
-mod unsaved;
 
 use egui::Ui;
 
@@ -62,8 +61,8 @@ pub(super) fn ui(ui: &Ui, dialogs: &mut Dialogs, ctx: &mut PanelContext<'_>, par
         Some(Dialog::Figure) => dialogs.figure.ui(ui, ctx, panels, requests),
         Some(Dialog::Palette) => dialogs.palette.ui(ui, ctx, tiles, actions),
         Some(Dialog::Settings) => settings::ui(ui, ctx.theme, settings, history, tiles.saved.names(), actions),
-        Some(Dialog::RemoveRun) => remove_run::ui(ui, ctx, dialogs.removed_run, history),
-        Some(Dialog::Unsaved) => unsaved::ui(ui, ctx, &dialogs.unsaved, requests),
+        Some(Dialog::RemoveRun) => questions::remove_run_ui(ui, ctx, dialogs.removed_run, history),
+        Some(Dialog::Unsaved) => questions::unsaved_ui(ui, ctx, &dialogs.unsaved, requests),
     };
     if !stays_open {
         dialogs.open = None;

@@ -90,16 +90,12 @@ fn commands(ctx: &PanelContext<'_>, tiles: &PanelTiles) -> Vec<Item> {
     items
 }
 
-fn shown<'a>(ctx: &PanelContext<'a>) -> Option<&'a RunRecord> {
-    ctx.recording.runs.get(ctx.selection.run.min(ctx.recording.runs.len().saturating_sub(1)))
-}
-
 /// Parameters of the shown run at the cursor, with the verdicts of the flight: the palette finds `weak`.
 fn parameters(ui: &Ui, ctx: &PanelContext<'_>) -> Vec<Item> {
-    let step = shown(ctx).and_then(|run| run.step_at(ctx.cursor_ns).or_else(|| run.steps.first()));
+    let step = ctx.selected_run().and_then(|run| run.step_at(ctx.cursor_ns).or_else(|| run.steps.first()));
     let names = ctx.names();
     let parameters = step.into_iter().flat_map(|step| &step.report.calibration.parameters);
-    let report = shown(ctx).map(|run| ctx.flight(ui, run)).unwrap_or_default();
+    let report = ctx.selected_run().map(|run| ctx.flight(ui, run)).unwrap_or_default();
     parameters
         .map(|parameter| {
             let row = report.rows.iter().find(|row| row.parameter == *parameter);
@@ -133,10 +129,10 @@ fn places(typed: &str, ctx: &PanelContext<'_>) -> Vec<Item> {
         let step = run.steps.iter().find(|step| step.report.frame_index as u64 == number)?;
         Some(step.report.stamp_ns)
     };
-    if let Some(stamp_ns) = shown(ctx).filter(|_| is("frame")).and_then(frame) {
+    if let Some(stamp_ns) = ctx.selected_run().filter(|_| is("frame")).and_then(frame) {
         items.push(item(format!("Go to frame {number} ({} s)", seconds(stamp_ns)), Action::GoTo(stamp_ns)));
     }
-    let step = shown(ctx).and_then(|run| run.step_at(ctx.cursor_ns));
+    let step = ctx.selected_run().and_then(|run| run.step_at(ctx.cursor_ns));
     let known = |id: FeatureId| {
         step.is_some_and(|step| {
             step.tracks.features.iter().any(|feature| feature.id == id)

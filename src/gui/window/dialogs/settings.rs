@@ -1,4 +1,4 @@
-//! Settings dialog.
+//! Dialog with the settings of the window.
 
 use egui::{DragValue, Grid, Key, Modifiers, RichText, Ui, vec2};
 

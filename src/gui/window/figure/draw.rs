@@ -1,19 +1,19 @@
-//! Drawing of figures as PDF, SVG or pixels.
+//! Drawing of figures as PDF, SVG or pixels, and of one panel without the window around it.
 
 use std::cell::RefCell;
 
-use egui::{Frame, Label, Panel, RichText, Ui, Vec2};
+use egui::{CentralPanel, Frame, Label, Panel, RichText, Ui, Vec2};
 use image::RgbaImage;
 
-use super::alone::{alone_ui, complete};
 use super::spec::{FigureFormat, FigureSpec};
 use crate::gui::desktop::DrawnFigure;
 use crate::gui::rendering::{headless, headless::HeadlessOptions};
 use crate::gui::theme::{PANEL_MARGIN, Theme};
 use crate::gui::window::panels::Panels;
-use crate::gui::{ImageSource, PanelContext, Playback, Presentation, Selection};
+use crate::gui::{ImageSource, PanelContext, PanelName, Playback, Presentation, Selection};
 use crate::observability::SlidePosition;
 use crate::session::Recording;
+use crate::text::Named as _;
 
 /// Pixels per point at which vectors are laid out: positions are rounded to pixels.
 const VECTOR_PIXELS_PER_POINT: f32 = 4.0;
@@ -21,6 +21,8 @@ const VECTOR_PIXELS_PER_POINT: f32 = 4.0;
 const DPI: f64 = 300.0;
 /// Largest side in pixels.
 const MAX_SIDE_PX: f32 = 16_384.0;
+/// Largest side in pixels that follows from the content.
+const MAX_CONTENT_SIDE_PX: f32 = 8192.0;
 
 /// Recording and state of the window that a figure shows.
 pub struct FigureInput<'a> {
@@ -116,4 +118,29 @@ impl FigureSpec {
         let drawn = Vec2::new(options.size_px[0] as f32, options.size_px[1] as f32);
         draw(options, self.size_mm(drawn), &mut ui)
     }
+}
+
+/// Draws one panel into all of `ui`.
+pub fn alone_ui(panel: PanelName, ui: &mut Ui, panels: &mut Panels, ctx: &mut PanelContext<'_>) {
+    let frame = Frame::new().fill(ctx.theme.surface).inner_margin(PANEL_MARGIN);
+    ctx.move_chain();
+    CentralPanel::no_frame().frame(frame).show(ui, |ui| panels.get(panel).ui(ui, ctx));
+}
+
+/// Options with the size at which tables and plots of a figure that would scroll are shown completely.
+pub(crate) fn complete(
+    panel: PanelName,
+    options: HeadlessOptions,
+    panels: &RefCell<Panels>,
+    ui: &mut dyn FnMut(&mut Ui),
+) -> HeadlessOptions {
+    if panel != PanelName::Comparison {
+        return options;
+    }
+    headless::svg_of(options, "clip", panel.name(), ui);
+    let wanted = panels.borrow().comparison.figure_size * options.pixels_per_point;
+    panels.borrow_mut().drop_textures();
+    let [width, height] = options.size_px;
+    let side = |least: u32, wanted: f32| least.max(wanted.ceil().min(MAX_CONTENT_SIDE_PX) as u32);
+    HeadlessOptions { size_px: [side(width, wanted.x), side(height, wanted.y)], ..options }
 }

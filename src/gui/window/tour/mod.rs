@@ -5,7 +5,6 @@
 
 mod card;
 pub(super) mod state;
-mod stop;
 mod story;
 #[cfg(test)]
 mod tests;
@@ -15,7 +14,7 @@ use egui::{Key, Modifiers, Popup, Ui};
 
 use self::card::{Pressed, card_ui};
 use self::state::Tour;
-use self::stop::Stop;
+use self::story::Stop;
 use super::panel_tiles::PanelTiles;
 use crate::gui::PanelContext;
 use crate::gui::rank::RankPanel;

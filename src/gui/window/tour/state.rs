@@ -1,8 +1,7 @@
 //! State of the tour: its stop, and the run and instant that it is about.
 
 use super::card::Pressed;
-use super::stop::Stop;
-use super::story::{self, CLASSICAL, Story};
+use super::story::{self, CLASSICAL, Stop, Story};
 use super::texts;
 use crate::gui::PanelContext;
 use crate::gui::theme::MAX_RUNS;

@@ -1,9 +1,11 @@
-//! Run and stamp on which the tour is based.
+//! The stops of the tour, and the run and stamp on which it is based.
 
 use std::sync::Arc;
 
 use crate::geometry::ns_from_seconds;
 use crate::gimbal::Parameterization;
+use crate::gui::PanelName;
+use crate::gui::window::tiles::Preset;
 use crate::session::{RunRecord, StepRecord};
 
 /// Run with a redundant parameterization.
@@ -13,6 +15,30 @@ pub(super) const CLASSICAL: &str = "classical";
 const SPAN_S: f64 = 6.0;
 /// Time in seconds between the loss of a direction and the stamp of the tour.
 const LOST_S: f64 = 0.5;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Stop {
+    Log,
+    Image,
+    Convergence,
+    Which,
+    Why,
+    Remedy,
+}
+
+impl Stop {
+    pub(super) const ALL: [Self; 6] = [Self::Log, Self::Image, Self::Convergence, Self::Which, Self::Why, Self::Remedy];
+
+    /// The layout, and the panel that the card points at.
+    pub(super) const fn place(self) -> (Preset, PanelName) {
+        match self {
+            Self::Log => (Preset::Overview, PanelName::Timeline),
+            Self::Image => (Preset::Overview, PanelName::Image),
+            Self::Convergence => (Preset::Calibration, PanelName::Convergence),
+            Self::Which | Self::Why | Self::Remedy => (Preset::Calibration, PanelName::Rank),
+        }
+    }
+}
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Story {

@@ -1,7 +1,6 @@
 //! Texts of the stops, with the numbers of the open recording.
 
-use super::stop::Stop;
-use super::story::{self, Story};
+use super::story::{self, Stop, Story};
 use crate::geometry::seconds_from_ns;
 use crate::gimbal::{ParameterId, ParameterNames};
 use crate::gui::PanelContext;
