@@ -64,6 +64,6 @@ pub fn write_flight_noise(report: &FlightNoiseReport, json: &str, folder: &Path)
 #[cfg(feature = "gui")]
 fn figures(report: &AllanReport) -> Vec<(&'static str, Vec<u8>)> {
     figure_files([PNG, SVG], [1920, 1040], ["allan", "Allan deviation"], |ui, theme| {
-        crate::gui::allan::allan_ui(ui, theme, report);
+        crate::gui::figures::allan_ui(ui, theme, report);
     })
 }

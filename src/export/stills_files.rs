@@ -164,6 +164,6 @@ fn correlations(outcome: &StillsOutcome) -> String {
 fn figures(outcome: &StillsOutcome) -> Vec<(&'static str, Vec<u8>)> {
     let names = [STILLS_FILES[7], STILLS_FILES[8]];
     figure_files(names, [1920, 1140], ["stills", "Calibration from stills"], |ui, theme| {
-        crate::gui::stills_figure::stills_ui(ui, theme, outcome);
+        crate::gui::figures::stills_ui(ui, theme, outcome);
     })
 }

@@ -5,9 +5,9 @@ use std::sync::Arc;
 use egui::{Role, Sense, Ui};
 use serde::{Deserialize, Serialize};
 
-use super::flight::{FlightReport, FlightTables};
-use super::reading::Reading;
-use super::slide::MovedChain;
+use super::derived::flight::{FlightReport, FlightTables};
+use super::derived::reading::Reading;
+use super::derived::slide::MovedChain;
 use super::theme::Theme;
 use crate::frontend::FeatureId;
 use crate::gimbal::{ParameterId, ParameterNames};

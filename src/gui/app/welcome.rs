@@ -8,8 +8,8 @@ use egui::{Align, Button, Layout, RichText, ScrollArea, Sense, Stroke, StrokeKin
 use super::repaint::POLL_PERIOD;
 use super::sample::SampleFlight;
 use crate::gui::desktop::Desktop;
-use crate::gui::path_field::PathField;
 use crate::gui::theme::Theme;
+use crate::gui::window::path_field::PathField;
 
 /// Maximum width of the content in points.
 const WIDTH: f32 = 760.0;

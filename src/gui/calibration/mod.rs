@@ -9,7 +9,7 @@ mod tests;
 use egui::{RichText, TextEdit, Ui};
 
 use self::order::Order;
-use super::flight::FlightReport;
+use super::derived::flight::FlightReport;
 use super::widgets::empty_ui;
 use super::{Panel, PanelContext};
 use crate::geometry::seconds_from_ns;

@@ -3,7 +3,7 @@
 use super::ConvergencePanel;
 use crate::files::csv_writer::{CsvWriter, number_cell, seconds_cell};
 use crate::gimbal::ParameterId;
-use crate::gui::chain_values::true_values;
+use crate::gui::derived::chain_values::true_values;
 use crate::gui::{CsvTable, PanelContext};
 
 impl CsvTable for ConvergencePanel {

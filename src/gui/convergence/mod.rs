@@ -16,7 +16,7 @@ use egui::{Label, Rect, RichText, ScrollArea, Ui, vec2};
 use self::groups::{ConvergenceView, groups_of};
 use self::model::{CalibrationHistory, ConvertedHistory};
 use self::paint::ParameterCurves;
-use super::chain_values::{ParameterValues, true_values};
+use super::derived::chain_values::{ParameterValues, true_values};
 use super::parameter_names::part_of;
 use super::plot::Wheel;
 use super::widgets::empty_ui;

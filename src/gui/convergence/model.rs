@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use crate::estimator::rigid_columns;
 use crate::gimbal::{NearestForm, ParameterId, Parameterization};
-use crate::gui::chain_values::{ParameterValues, parameter_values, principal_values, unwrap_towards};
-use crate::gui::follow::Follower;
+use crate::gui::derived::chain_values::{ParameterValues, parameter_values, principal_values, unwrap_towards};
+use crate::gui::derived::follow::Follower;
 use crate::observability::Determination;
 use crate::sensors::Rig;
 use crate::session::{FlightVerdicts, RunRecord, StepRecord};

@@ -9,7 +9,7 @@ use super::model::{CalibrationHistory, ConvertedHistory, ParameterCurve};
 use super::range::{paint_outside, value_range};
 use crate::gimbal::{ParameterId, Parameterization};
 use crate::gui::PanelContext;
-use crate::gui::chain_values::ParameterValues;
+use crate::gui::derived::chain_values::ParameterValues;
 use crate::gui::determination::look_of;
 use crate::gui::help::terms::window;
 use crate::gui::parameter_names::{CalibrationPart, heading_of, meaning_of};

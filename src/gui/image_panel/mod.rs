@@ -16,7 +16,7 @@ use self::model::ImageModel;
 pub use self::model::SolveSide;
 use self::paint::{ImagePlacement, MarkOptions};
 use super::help::terms::window;
-use super::pan_zoom::PanZoom;
+use super::plot::pan_zoom::PanZoom;
 use super::under_pointer::{Item, offer, offer_item};
 use super::units::significant;
 use super::widgets::{describe, empty_ui};

@@ -5,7 +5,7 @@ use egui::{RichText, Ui};
 use super::rows::rows_ui;
 use crate::gimbal::ParameterId;
 use crate::gui::PanelContext;
-use crate::gui::chain_values::true_values;
+use crate::gui::derived::chain_values::true_values;
 use crate::gui::help::terms::parameter as terms;
 use crate::gui::parameter_names::meaning_of;
 use crate::gui::units::{Shown, fixed};

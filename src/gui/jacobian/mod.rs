@@ -18,7 +18,7 @@ use egui::{Pos2, Rect, Role, Sense, Ui, Vec2, WidgetInfo, vec2};
 use self::model::JacobianModel;
 pub(super) use self::model::{cameras, column_name, name_of};
 use super::help::terms::window;
-use super::pan_zoom::PanZoom;
+use super::plot::pan_zoom::PanZoom;
 use super::under_pointer::{Item, offer, offer_item};
 use super::widgets::{describe, empty_ui};
 use super::{Panel, PanelContext};

@@ -8,6 +8,7 @@ mod axis;
 mod curve;
 mod navigate;
 mod on_screen;
+pub(in crate::gui) mod pan_zoom;
 mod readout;
 mod run_legend;
 mod value_axis;

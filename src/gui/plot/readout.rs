@@ -8,8 +8,8 @@ use super::area::PlotArea;
 use super::axes::{TIME_GUTTER, VALUE_GUTTER};
 use super::axis::decimals_of_step;
 use crate::gui::PanelContext;
+use crate::gui::derived::reading::{EventLineKind, ReadingCursor};
 use crate::gui::events::look_of;
-use crate::gui::reading::{EventLineKind, ReadingCursor};
 use crate::gui::theme::{Theme, number_font};
 use crate::gui::units::{fixed, seconds};
 

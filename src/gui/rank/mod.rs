@@ -25,7 +25,7 @@ use self::sections::{MIN_HEIGHT_WITH_CAUSE, fact_at_ui, headline_ui, section_ui}
 use self::slider::SliderUi;
 use self::spectrum::ranks_text;
 use self::verdict::{Level, RankVerdict};
-use super::follow::RunTables;
+use super::derived::follow::RunTables;
 use super::help::terms::window;
 use super::plot::{
     Clicks, Curve, Interaction, PlotArea, Readout, TIME_GUTTER, Wheel, overflows, paint_ground, paint_steps,

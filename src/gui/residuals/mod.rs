@@ -13,7 +13,7 @@ use egui::{
 };
 
 use self::image_plane::ImagePlane;
-use super::follow::RunTables;
+use super::derived::follow::RunTables;
 use super::help::terms::{Term, factors, window};
 use super::plot::{
     Clicks, Curve, Interaction, PlotArea, Readout, TIME_GUTTER, Wheel, decimals_of_step, overflows, paint_curve,

@@ -12,7 +12,7 @@ use super::tube;
 use crate::camera::CameraModel;
 use crate::estimator::{FrameStateReport, LandmarkReport};
 use crate::geometry::RigidTransform;
-use crate::gui::follow::{RunTables, StepTable};
+use crate::gui::derived::follow::{RunTables, StepTable};
 use crate::gui::theme::{Theme, mix};
 use crate::sensors::GrayImage;
 use crate::session::{PositionTruth, Recording, RunRecord, TrajectoryLane};

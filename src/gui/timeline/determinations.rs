@@ -3,8 +3,8 @@
 use egui::{Align2, Painter, Rangef, Rect, Role, Ui, WidgetInfo, pos2, vec2};
 
 use crate::gui::PanelContext;
+use crate::gui::derived::flight::{DeterminationHistory, ParameterHistory};
 use crate::gui::determination::{LEVELS, level_color, level_of, look_of};
-use crate::gui::flight::{DeterminationHistory, ParameterHistory};
 use crate::gui::plot::PlotArea;
 use crate::gui::theme::{self, Theme};
 use crate::gui::under_pointer::{Item, offer_item};

@@ -1,7 +1,7 @@
 //! The content of the lanes, read from the steps incrementally.
 
 use crate::estimator::{EventKind, Phase};
-use crate::gui::follow::Follower;
+use crate::gui::derived::follow::Follower;
 use crate::gui::residuals::rms_px;
 use crate::session::RunRecord;
 

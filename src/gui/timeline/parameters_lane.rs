@@ -9,7 +9,7 @@ use super::lanes::{self, Lane};
 use super::stretch::TimelineStretch;
 use super::transport;
 use crate::gui::PanelContext;
-use crate::gui::flight::DeterminationHistory;
+use crate::gui::derived::flight::DeterminationHistory;
 use crate::gui::plot::PlotArea;
 use crate::observability::Determination;
 

@@ -23,6 +23,7 @@ mod notices;
 mod panel_export;
 mod panel_tiles;
 mod panels;
+pub(in crate::gui) mod path_field;
 mod perform;
 #[cfg(test)]
 mod pointer_tests;

@@ -13,8 +13,8 @@ use super::settings::Settings;
 use super::status_bar::AppStatus;
 use super::tour::state::Tour;
 use crate::gui::PanelContext;
+use crate::gui::derived::reading::EventLines;
 use crate::gui::help::Help;
-use crate::gui::reading::EventLines;
 use crate::session::{Command, Markers};
 
 /// State of the window without the session.

@@ -9,8 +9,8 @@ use egui::{Label, RichText, Ui};
 
 use super::modal::Modal;
 use crate::gui::desktop::Desktop;
-use crate::gui::path_field::PathField;
 use crate::gui::theme::Theme;
+use crate::gui::window::path_field::PathField;
 
 /// Period at which the desktop's file dialog is polled.
 const POLL_PERIOD: Duration = Duration::from_millis(100);

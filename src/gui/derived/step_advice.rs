@@ -28,7 +28,7 @@ impl StepAdvice {
 }
 
 /// Suggested excitation for the chain after a step of a run with a rig's camera; `None` if no parameter is estimated.
-pub(super) fn step_advice(step: &Arc<StepRecord>, rig: &Arc<Rig>, camera_key: &str) -> Option<Arc<Advice>> {
+pub(in crate::gui) fn step_advice(step: &Arc<StepRecord>, rig: &Arc<Rig>, camera_key: &str) -> Option<Arc<Advice>> {
     let known = || KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(found) = known().iter().find(|it| it.is_of(step, rig, camera_key)) {
         return found.advice.clone();

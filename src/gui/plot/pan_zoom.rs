@@ -2,18 +2,18 @@
 
 use egui::{LayerId, Order, PointerButton, Rect, Response, Stroke, StrokeKind, Ui, Vec2};
 
-use super::theme::Theme;
+use crate::gui::theme::Theme;
 
 /// Minimum side in points of a box that is selected with the pointer.
 const MIN_BOX: f32 = 8.0;
 
 /// The visible region of an image or matrix ("picture").
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct PanZoom {
+pub(in crate::gui) struct PanZoom {
     /// Size relative to the fitted size.
-    pub(super) zoom: f32,
+    pub(in crate::gui) zoom: f32,
     /// Centre of the region as fractions of the picture's size.
-    pub(super) centre: Vec2,
+    pub(in crate::gui) centre: Vec2,
 }
 
 impl Default for PanZoom {
@@ -25,14 +25,14 @@ impl Default for PanZoom {
 impl PanZoom {
     /// Rectangle of the whole picture around the centre of `area`, given its fitted size; it may be larger than the
     /// area.
-    pub(super) fn place(self, area: Rect, fitted: Vec2) -> Rect {
+    pub(in crate::gui) fn place(self, area: Rect, fitted: Vec2) -> Rect {
         let size = fitted * self.zoom;
         Rect::from_min_size(area.center() - self.centre * size, size)
     }
 
     /// The wheel and pinching zoom about the pointer, dragging and horizontal scrolling pan, a drag with the secondary
     /// button zooms to a box, a double click fits the picture.
-    pub(super) fn navigate(
+    pub(in crate::gui) fn navigate(
         &mut self,
         ui: &Ui,
         theme: &Theme,

@@ -5,10 +5,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 use egui::Context;
 
 use super::follow::Follower;
+use super::step_advice::step_advice;
 use super::step_work::{REPAINT, StepWork};
 use crate::gimbal::ParameterId;
 use crate::gui::parameter_names::place_of;
-use crate::gui::step_advice::step_advice;
 use crate::observability::Determination;
 use crate::observability::laboratory::Advice;
 use crate::session::{FlightParameter, FlightVerdicts, Recording, RunRecord, StepRecord};

@@ -5,15 +5,15 @@ use std::sync::Arc;
 
 use egui::{Id, Key, Modifiers, RichText, ScrollArea, TextEdit, Ui};
 
-use super::desktop::{Desktop, PathEntry};
-use super::theme::Theme;
+use crate::gui::desktop::{Desktop, PathEntry};
+use crate::gui::theme::Theme;
 
 /// Maximum number of completions.
 const MAX_ENTRIES: usize = 200;
 
 /// The text field with its completions.
 #[derive(Default)]
-pub(crate) struct PathField {
+pub(in crate::gui) struct PathField {
     desktop: Option<Arc<dyn Desktop>>,
     typed: String,
     chosen: Option<usize>,
@@ -21,16 +21,16 @@ pub(crate) struct PathField {
 }
 
 impl PathField {
-    pub(crate) fn new(desktop: Arc<dyn Desktop>) -> Self {
+    pub(in crate::gui) fn new(desktop: Arc<dyn Desktop>) -> Self {
         Self { desktop: Some(desktop), ..Self::default() }
     }
 
-    pub(crate) fn is_empty(&self) -> bool {
+    pub(in crate::gui) fn is_empty(&self) -> bool {
         self.typed.trim().is_empty()
     }
 
     /// Draws the text field; returns the chosen path.
-    pub(crate) fn ui(&mut self, ui: &mut Ui, theme: &Theme, focus: bool, height: f32) -> Option<PathBuf> {
+    pub(in crate::gui) fn ui(&mut self, ui: &mut Ui, theme: &Theme, focus: bool, height: f32) -> Option<PathBuf> {
         if self.completed.as_ref().is_none_or(|(typed, _)| *typed != self.typed) {
             let mut entries = self.desktop.as_ref().map_or_else(Vec::new, |desktop| desktop.complete(&self.typed));
             // After a completed folder, its content is listed.

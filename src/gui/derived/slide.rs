@@ -23,7 +23,7 @@ impl PartialEq for MovedChain {
 
 impl MovedChain {
     /// Computes the moved chain of a run's step when position, run or step has changed.
-    pub(super) fn update(
+    pub(in crate::gui) fn update(
         &mut self,
         recording: &Recording,
         step: Option<(&RunRecord, &Arc<StepRecord>)>,
@@ -42,7 +42,7 @@ impl MovedChain {
     }
 
     /// The moved chain if it belongs to the step of this run with this stamp; other runs have steps at equal stamps.
-    pub(super) fn at(&self, run: &RunRecord, stamp_ns: i64) -> Option<&Arc<ChainSlide>> {
+    pub(in crate::gui) fn at(&self, run: &RunRecord, stamp_ns: i64) -> Option<&Arc<ChainSlide>> {
         self.slide.as_ref().filter(|slide| self.run == Some(run.id) && slide.stamp_ns == stamp_ns)
     }
 }

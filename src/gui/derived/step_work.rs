@@ -11,11 +11,11 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use crate::session::StepRecord;
 
 /// Period at which the window checks for the result.
-pub(super) const REPAINT: Duration = Duration::from_millis(50);
+pub(in crate::gui) const REPAINT: Duration = Duration::from_millis(50);
 
 /// The result for the step that was requested last.
 #[derive(Debug)]
-pub(super) struct StepWork<T> {
+pub(in crate::gui) struct StepWork<T> {
     known: Option<(Arc<StepRecord>, Option<T>)>,
     coming: Option<(Arc<StepRecord>, Receiver<Option<T>>)>,
 }
@@ -27,16 +27,16 @@ impl<T> Default for StepWork<T> {
 }
 
 impl<T: Send + 'static> StepWork<T> {
-    pub(super) fn has_result(&self, step: &StepRecord) -> bool {
+    pub(in crate::gui) fn has_result(&self, step: &StepRecord) -> bool {
         self.known.as_ref().is_some_and(|(known, _)| std::ptr::eq(Arc::as_ptr(known), step))
     }
 
-    pub(super) fn is_busy(&self) -> bool {
+    pub(in crate::gui) fn is_busy(&self) -> bool {
         self.coming.is_some()
     }
 
     /// Starts the computation `work` for a step unless it is running or done, and receives finished results.
-    pub(super) fn request<W>(
+    pub(in crate::gui) fn request<W>(
         &mut self,
         step: &Arc<StepRecord>,
         thread_name: &str,
@@ -55,7 +55,7 @@ impl<T: Send + 'static> StepWork<T> {
     }
 
     /// Receives the result for the step that was requested last.
-    pub(super) fn receive(&mut self) {
+    pub(in crate::gui) fn receive(&mut self) {
         let Some((_, coming)) = &self.coming else { return };
         let result = match coming.try_recv() {
             Err(TryRecvError::Empty) => return,
@@ -65,7 +65,7 @@ impl<T: Send + 'static> StepWork<T> {
     }
 
     /// The step that was computed last, with its result.
-    pub(super) fn last(&self) -> Option<(&Arc<StepRecord>, Option<&T>)> {
+    pub(in crate::gui) fn last(&self) -> Option<(&Arc<StepRecord>, Option<&T>)> {
         self.known.as_ref().map(|(step, result)| (step, result.as_ref()))
     }
 }
