@@ -130,11 +130,12 @@ impl Choices {
 
     fn knowledge_ui(&mut self, ui: &mut Ui) {
         let name_of = |joints: &Joints| joints.name().to_owned();
-        let angles = choice_ui(ui, "Joint angles", 80.0, &mut self.joints, Joints::all(), name_of)
-            .on_hover_text(window::JOINT_ANGLES.meaning);
+        let name = "Joint angles";
+        choice_ui(ui, name, 80.0, &mut self.joints, Joints::all(), name_of).on_hover_text(window::JOINT_ANGLES.meaning);
         if self.joints == Joints::Encoder {
             let sigma = egui::DragValue::new(&mut self.encoder_sigma_deg).range(1e-3..=45.0).speed(0.01).suffix("°");
-            ui.add(sigma).labelled_by(angles.id).on_hover_text(window::JOINT_ANGLES.meaning);
+            let sigma = ui.add(sigma).on_hover_text(window::JOINT_ANGLES.meaning);
+            sigma.ctx.accesskit_node_builder(sigma.id, |node| node.set_label(name));
         }
         choice_ui(ui, "Poses", 110.0, &mut self.poses, Poses::all(), |poses| poses.name().to_owned())
             .on_hover_text(window::POSES.meaning);

@@ -89,7 +89,8 @@ fn threshold(painter: &egui::Painter, theme: &Theme, plot: Rect, y: f32, name: &
     painter.extend(egui::Shape::dashed_line(&points, Stroke::new(1.0, theme.text_strong), 4.0, 3.0));
     let galley = painter.layout_no_wrap(name.to_owned(), label_font(), theme.text_strong);
     let plate = (theme.plot_background.gamma_multiply(0.8), vec2(2.0, -1.0));
-    plated_text(painter, pos2(plot.right() - 2.0, y), Align2::RIGHT_BOTTOM, (galley, theme.text_strong), plate);
+    let at = pos2(plot.right() - galley.size().x - 2.0, y);
+    plated_text(painter, at, Align2::LEFT_BOTTOM, (galley, theme.text_strong), plate);
 }
 
 /// Logarithmic axis that contains the spectra of all reports.
