@@ -21,7 +21,7 @@ pub use dimension::Dimension;
 pub use rigid_transform::RigidTransform;
 pub(crate) use scalars::planar_length;
 pub use scalars::{
-    ns_from_seconds, principal_angle, seconds_from_ns, smooth_step, tangent_basis, vertical_angle, wrap_angle,
+    ns_from_seconds, principal_angle, seconds_from_ns, smooth_step, tangent_basis, ticks, vertical_angle, wrap_angle,
 };
 pub use signed_axes::SignedAxes;
 pub use so3::best_rotation;

@@ -1,4 +1,5 @@
-//! Small functions of numbers: time units, angles, lengths in the image plane, tangent plane of a direction.
+//! Small functions of numbers: time units, angles, lengths in the image plane, tangent plane of a direction,
+//! ticks of an axis.
 
 use std::f64::consts::{PI, TAU};
 
@@ -55,4 +56,23 @@ pub fn tangent_basis(direction: &Vector3<f64>) -> Matrix3x2<f64> {
     let first = direction.cross(&helper).normalize();
     let second = direction.cross(&first);
     Matrix3x2::from_columns(&[first, second])
+}
+
+/// Round values for the ticks of an axis from `low` to `high`, at most `max_count`, and their spacing.
+pub fn ticks(low: f64, high: f64, max_count: usize) -> (Vec<f64>, f64) {
+    let span = high - low;
+    if !(span.is_finite() && span > 0.0) || max_count == 0 {
+        return (Vec::new(), 1.0);
+    }
+    let rough = span / max_count as f64;
+    let power = 10_f64.powf(rough.log10().floor());
+    let step = [1.0, 2.0, 5.0, 10.0].into_iter().map(|digit| digit * power).find(|step| *step >= rough * 0.999_999);
+    let step = step.unwrap_or(10.0 * power);
+    let first = (low / step).ceil() as i64;
+    let last = (high / step).floor() as i64;
+    // A range that is narrow relative to the magnitude of its values has no useful ticks.
+    if last.saturating_sub(first) > 2 * max_count as i64 {
+        return (Vec::new(), step);
+    }
+    ((first..=last).map(|number| number as f64 * step).collect(), step)
 }

@@ -1,6 +1,6 @@
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector6};
 
-use super::{RigidTransform, SplitMix64, median, so3, tangent_basis};
+use super::{RigidTransform, SplitMix64, median, so3, tangent_basis, ticks};
 
 /// Rotation vectors from tiny to just under half a revolution.
 fn rotation_vectors() -> Vec<Vector3<f64>> {
@@ -178,4 +178,12 @@ fn median_of_an_even_count_is_the_upper_one() {
     assert_eq!(median([3.0]), Some(3.0));
     assert_eq!(median([4.0, 1.0, 3.0, 2.0]), Some(3.0));
     assert_eq!(median([5.0, -1.0, 2.0]), Some(2.0));
+}
+
+#[test]
+fn ticks_are_round() {
+    assert_eq!(ticks(0.0, 10.0, 5), (vec![0.0, 2.0, 4.0, 6.0, 8.0, 10.0], 2.0));
+    assert_eq!(ticks(-0.3, 0.35, 3).0, [0.0]);
+    assert_eq!(ticks(1.0, 1.0, 4).0, [0.0; 0]);
+    assert_eq!(ticks(f64::NAN, 1.0, 4).0, [0.0; 0]);
 }

@@ -8,7 +8,7 @@ use maud::{Markup, html};
 use super::{AlignmentEvidence, VideoAlignment};
 use crate::export::ExportError;
 use crate::files::output::write_file;
-use crate::gui::plot::ticks;
+use crate::geometry::ticks;
 use crate::log_check::ClockAlignment;
 
 /// Size of the drawing, and margins of both plots in it.
