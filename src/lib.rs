@@ -11,6 +11,7 @@
 //! | [`camera`] | projection and back-projection with their Jacobians | gimbals, images |
 //! | [`gimbal`] | the actuated chain in each parameterization, its Jacobians, conversions and singularity margins | measurements |
 //! | [`sensors`] | plain types of sensor measurements and of the rig that describes the sensors | the source of the data |
+//! | [`faults`] | faults of measurements and rigs: their table, their application and its inverse, sentences, ranking of explanations | logs, the estimator, screens |
 //! | [`optimization`] | robust loss, reprojection residual with its Jacobians, elimination of landmarks, damped solver | the meaning of the unknowns |
 //! | `files` | files that are no logs: rigs, stills, robot descriptions, tables; atomic output and limits of what is read | logs |
 //! | `flight_log` | MCAP in and out as typed events in time order; the rig of a log; logs of other recorders | the use of the events |
@@ -93,6 +94,7 @@ pub mod desktop;
 pub mod estimator;
 #[cfg(feature = "logs")]
 pub mod export;
+pub mod faults;
 #[cfg(feature = "logs")]
 pub mod files;
 #[cfg(feature = "logs")]

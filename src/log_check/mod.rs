@@ -5,14 +5,12 @@
 
 mod check;
 mod clock_alignment;
-mod correction;
 mod extrinsics;
 mod gimbal;
 mod ground_truth;
 mod hypotheses;
 mod images;
 mod imu;
-mod measured_fault;
 mod noise;
 mod permutations;
 mod report;
@@ -29,7 +27,6 @@ pub use self::check::check;
 pub use self::clock_alignment::{
     AlignmentError, AlignmentReference, ClockAlignment, RotationReference, align_camera, align_clocks,
 };
-pub use self::measured_fault::{FaultySource, MeasuredFault};
 pub use self::noise::{
     AllanPoint, AllanReport, AxisNoise, GivenNoise, NoiseTerm, NoiseTerms, SensorNoise, measure_noise,
 };

@@ -49,10 +49,10 @@ impl AngularRates {
         Self { bridges_gaps: true, ..self }
     }
 
-    /// The rates times a factor.
+    /// The rates with each one changed.
     #[must_use]
-    pub fn scaled(&self, factor: f64) -> Self {
-        let samples = self.times_s.iter().zip(&self.rates_rad_per_s).map(|(time_s, rate)| (*time_s, rate * factor));
+    pub fn changed(&self, change: impl Fn(&Vector3<f64>) -> Vector3<f64>) -> Self {
+        let samples = self.times_s.iter().zip(&self.rates_rad_per_s).map(|(time_s, rate)| (*time_s, change(rate)));
         Self { bridges_gaps: self.bridges_gaps, ..Self::new(samples) }
     }
 

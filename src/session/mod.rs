@@ -28,7 +28,7 @@ mod record;
 pub(crate) mod tests;
 
 pub use diagnosis::{
-    AgreementValue, Cause, Diagnosis, DiagnosisVerdict, LogFaults, RankedCause, TruthAgreement, WaitingReason, diagnose,
+    AgreementValue, Diagnosis, DiagnosisVerdict, LogFaults, RankedCause, TruthAgreement, WaitingReason, diagnose,
 };
 pub use engine::{
     BreakpointHit, CalibrationErrors, CalibrationRequest, CalibrationRun, CalibrationRunError, Computation,
@@ -37,9 +37,8 @@ pub use engine::{
 };
 pub use plan::{
     DEFAULT_MEMORY_BUDGET_BYTES, EstimatorTuning, FORK_PARAMETERIZATIONS, FlightPrior, FlightSigmas, ForkChanges,
-    ForkError, ImageFlip, ImageHalf, LoadedPositions, LoadedTrajectory, MAX_RUNS, MAX_TRAJECTORIES,
-    MeasurementCorrection, ParameterizationChoice, RunSpec, RunSpecError, SessionError, SessionPlan, SessionRequest,
-    TrajectorySource, TrajectorySpec, TrajectorySpecError,
+    ForkError, LoadedPositions, LoadedTrajectory, MAX_RUNS, MAX_TRAJECTORIES, ParameterizationChoice, RunSpec,
+    RunSpecError, SessionError, SessionPlan, SessionRequest, TrajectorySource, TrajectorySpec, TrajectorySpecError,
 };
 pub use playback::{
     Command, Cursor, DiagnosisProgress, FrameImage, Marker, Markers, MoveOutcome, Moved, PlaybackSpeed,

@@ -3,12 +3,13 @@
 use super::imports::{Imports, is_test_file, source_files};
 
 /// Folders from the first to the last; each may use those before it. The table in `src/lib.rs` says what each promises.
-const ORDER: [&str; 24] = [
+const ORDER: [&str; 25] = [
     "text",
     "geometry",
     "camera",
     "gimbal",
     "sensors",
+    "faults",
     "optimization",
     "files",
     "flight_log",

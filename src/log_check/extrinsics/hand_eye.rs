@@ -5,13 +5,12 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use nalgebra::{UnitQuaternion, Vector3};
 
+use crate::faults::{Fault, FaultKind, USELESS_DELAY_S};
 use crate::geometry::{best_rotation, so3};
 use crate::gimbal::ClassicalChain;
 use crate::log_check::clock_alignment::{ClockAlignment, RotationReference, align_clocks};
-use crate::log_check::correction::{Correction, USELESS_DELAY_S};
 use crate::log_check::hypotheses::{self, Explanation, WithinNoise};
 use crate::log_check::imu::ImuFacts;
-use crate::log_check::measured_fault::MeasuredFault;
 use crate::log_check::report::{Area, Findings, ImageRotation, Measurement, Severity};
 use crate::log_check::rotations::data::{JOINED_S, RotationData, joined};
 use crate::log_check::rotations::fit::{FREE_ORIENTATION_RAD, FitPriors, RotationFit, RotationPair};
@@ -133,8 +132,8 @@ pub(super) fn check_against_gyroscope(
 impl HandEye<'_> {
     /// Rotations over at least `length_s` with the data that predict them at an additional time offset.
     fn pairs(&self, chain: &ClassicalChain, offset_s: f64, length_s: f64) -> Vec<RotationPair> {
-        let correction = Correction { camera_delay_s: offset_s, ..Correction::none(chain.joint_count()) };
-        let predictor = self.data.predictor(chain, &correction);
+        let shift = Fault::new(FaultKind::CameraClock, &[offset_s]);
+        let predictor = self.data.predictor(chain, Some(&shift));
         joined(&self.data.measured, length_s).iter().filter_map(|it| predictor.pair(it)).collect()
     }
 
@@ -182,7 +181,7 @@ impl HandEye<'_> {
             let remedy = format!("set {key}.timeshift_cam_imu to {:+.3}", given_s + offset_s);
             let severity = if offset_s.abs() > USELESS_DELAY_S { Severity::Error } else { Severity::Warning };
             findings.add(severity, Area::Time, title, evidence, remedy);
-            findings.state_faults([MeasuredFault::CameraShift { camera_key: key.clone(), shift_s: offset_s }]);
+            findings.state_faults([Fault::new(FaultKind::CameraClock, &[offset_s]).of_camera(key)]);
         } else {
             let title = format!("no time offset of {key} explains its rotations");
             findings.add(Severity::Note, Area::Time, title, evidence, "see the finding on its orientation");
@@ -283,16 +282,13 @@ impl HandEye<'_> {
             (format!("the orientation of {key} differs from the rig by {:.1}°", angle_rad.to_degrees()), CALIBRATE)
         };
         let causes = &found.instead_of_orientation;
-        let mut titles: Vec<&str> = causes.iter().map(|cause| cause.title.as_str()).collect();
-        let mut remedies: Vec<&str> = causes.iter().map(|cause| cause.remedy.as_str()).collect();
+        let mut titles: Vec<&str> = causes.iter().map(|cause| cause.sentence.statement.as_str()).collect();
+        let mut remedies: Vec<&str> = causes.iter().map(|cause| cause.sentence.remedy.as_str()).collect();
         titles.insert(found.more_likely, &title);
         remedies.insert(found.more_likely, remedy);
         findings.add(severity, Area::Extrinsics, titles.join(", or "), evidence, remedies.join("; or "));
-        let camera_key = key.clone();
-        let fault = match turned_images(orientation) {
-            Some(_) => MeasuredFault::ImagesTurned { camera_key },
-            None => MeasuredFault::Orientation { camera_key },
-        };
+        let kind = if turned_images(orientation).is_some() { FaultKind::ImageFlip } else { FaultKind::Chain };
+        let fault = Fault::from(kind).of_camera(key);
         findings.state_faults(causes.iter().filter_map(|cause| cause.fault.clone()).chain([fault]));
     }
 

@@ -1,10 +1,10 @@
 //! Joint angles that stop changing although the vehicle rotates.
 
+use crate::faults::FaultKind;
 use crate::flight_log::imu::filter::ROTATING_RAD_PER_S;
 use crate::flight_log::joints::JointReading;
 use crate::geometry::seconds_from_ns;
 use crate::log_check::imu::ImuFacts;
-use crate::log_check::measured_fault::{FaultySource, MeasuredFault};
 use crate::log_check::report::{Area, Findings, Measurement, Severity};
 use crate::log_check::survey::Survey;
 use crate::sensors::{Joint, Rig};
@@ -70,7 +70,7 @@ fn check_joint(joint: &Joint, readings: &[(i64, f64)], imu: &ImuFacts, findings:
     let remedy = "the driver repeats its last reading: check the connection of the encoder; use --duration or --start to \
                   run on the log outside of these intervals";
     findings.add(Severity::Error, Area::Encoders, title, evidence, remedy);
-    findings.state_faults([MeasuredFault::Irreversible(FaultySource::Joints)]);
+    findings.state_faults([FaultKind::UnusableJoints.into()]);
     findings.exclude(Measurement::Joints);
 }
 

@@ -3,10 +3,10 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 
+use crate::faults::FaultKind;
 use crate::flight_log::joints::attitude::MAX_VEHICLE_GAP_NS;
 use crate::geometry::{SIGMA_PER_MEDIAN, best_rotation, seconds_from_ns, so3};
 use crate::log_check::imu::ImuFacts;
-use crate::log_check::measured_fault::{FaultySource, MeasuredFault};
 use crate::log_check::report::{Area, Findings, Severity};
 use crate::log_check::statistics::median;
 use crate::log_check::survey::Survey;
@@ -79,7 +79,7 @@ pub(crate) fn check_vehicle_attitude(survey: &Survey, rig: &Rig, imu_facts: &Imu
         let largest_rad = steps.iter().map(|step| step.change_rad.abs()).fold(0.0, f64::max);
         let severity = if largest_rad > USELESS_STEP_RAD { Severity::Error } else { Severity::Warning };
         findings.add(severity, Area::Encoders, title, scatter, remedy);
-        findings.state_faults([MeasuredFault::Irreversible(FaultySource::Joints)]);
+        findings.state_faults([FaultKind::UnusableJoints.into()]);
     }
     if source.frame == AttitudeFrame::Earth {
         let title = format!("a constant error of the heading of {topic} is unobservable in the rotations");

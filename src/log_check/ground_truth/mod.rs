@@ -8,9 +8,9 @@ use nalgebra::{UnitQuaternion, Vector3};
 use self::placed_forces::{PlacedForces, velocity_at};
 use super::clock_alignment::{AlignmentError, ClockAlignment, RotationReference, align_clocks};
 use super::imu::ImuFacts;
-use super::measured_fault::MeasuredFault;
 use super::report::{Area, Findings, ImageRotation, Measurement, Severity};
 use super::statistics::median;
+use crate::faults::{Fault, FaultKind};
 use crate::flight_log::log::relative_ns;
 use crate::flight_log::stamps::spacing::Spacing;
 use crate::flight_log::{FlightLog, RecordedPose};
@@ -90,7 +90,7 @@ impl GroundTruth<'_> {
     ) {
         let rotations = self.rotations();
         let [given, reversed] = [1.0, -1.0].map(|factor| {
-            let reference = RotationReference::Gyroscope(imu_facts.gyroscope.scaled(factor));
+            let reference = RotationReference::Gyroscope(imu_facts.gyroscope.changed(|rate| rate * factor));
             align_clocks(&rotations, &reference, 0.0, MAX_OFFSET_S)
         });
         if let Ok(reversed) = &reversed
@@ -286,7 +286,7 @@ fn report_body(found: &ClockAlignment, turns_of_imu: &[UnitQuaternion<f64>], fin
                           the axes that it has";
             findings.add(Severity::Error, Area::Imu, title, evidence, remedy);
             let axes = SignedAxes::nearest(&body_from_imu.to_rotation_matrix().into_inner());
-            return findings.state_faults(axes.map(MeasuredFault::GyroscopeAxes));
+            return findings.state_faults(axes.map(|axes| Fault::of_axes(FaultKind::GyroscopeAxes, axes)));
         }
         let title = format!("the ground truth is of another body frame: {turned}");
         let remedy = "publish the pose of the IMU: attitude errors and NEES contain this rotation, and position errors the \

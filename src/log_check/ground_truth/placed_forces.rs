@@ -2,10 +2,10 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use crate::faults::{Fault, FaultKind};
 use crate::geometry::{RigidTransform, SignedAxes, ns_from_seconds, seconds_from_ns, so3, standard_deviation};
 use crate::log_check::clock_alignment::ClockAlignment;
 use crate::log_check::imu::axes::{CORRECT_AXES, WINDOW_NS, fits_decisively, other_accelerometer_axes};
-use crate::log_check::measured_fault::MeasuredFault;
 use crate::log_check::report::{Area, Findings, Measurement, Severity};
 use crate::sensors::ImuSample;
 
@@ -82,7 +82,7 @@ impl PlacedForces<'_> {
             moved.sqrt()
         );
         findings.add(Severity::Error, Area::Imu, title, evidence, remedy);
-        findings.state_faults([MeasuredFault::AccelerometerAxes(axes)]);
+        findings.state_faults([Fault::of_axes(FaultKind::AccelerometerAxes, axes)]);
         findings.exclude(Measurement::Accelerometer);
         true
     }

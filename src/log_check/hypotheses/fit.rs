@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 
-use super::super::correction::{Correction, LensChange, Parameter};
 use super::super::statistics::median;
+use crate::faults::{Fault, FaultKind, LensChange};
 use crate::gimbal::ClassicalChain;
 use crate::log_check::rotations::data::{JOINED_S, MeasuredRotation, RotationData, joined};
 use crate::log_check::rotations::fit::{
@@ -27,12 +27,6 @@ const FOCAL_PRECISION: f64 = 1e-3;
 const CONVERGED: f64 = 0.05;
 /// Number of starts from which a hypothesis is fitted until it converges: the best after one iteration.
 const FOLLOWED: usize = 2;
-/// Smallest corrections that count as a fault where noise explains the rotations without them.
-const NOTICEABLE_SCALE: f64 = 0.03;
-const NOTICEABLE_ANGLE_RAD: f64 = 0.026;
-const NOTICEABLE_DELAY_S: f64 = 0.02;
-/// In seconds per second.
-const NOTICEABLE_DRIFT: f64 = 2e-4;
 /// Ratio of the median misfit with a correction to that without up to which it removes a misfit.
 const REMOVED_MISFIT: f64 = 0.6;
 /// Minimum number of rotations.
@@ -41,20 +35,20 @@ const MIN_ROTATIONS: usize = 12;
 /// Possible cause of a misfit.
 #[derive(Clone, Debug, PartialEq)]
 pub(in crate::log_check) struct Hypothesis {
-    pub(super) kind: Kind,
-    /// Corrections from which the parameters are fitted; the best fit is taken.
-    pub(super) starts: Vec<Correction>,
-    pub(super) parameters: Vec<Parameter>,
-    /// Times in seconds from which on the correction may apply; the best one is taken. Empty: to the whole log.
-    pub(super) since_s: Vec<f64>,
+    /// Faults from which the values are fitted; the best fit is taken.
+    starts: Vec<Fault>,
+    /// Number of the first values that are fitted.
+    fitted: usize,
+    /// Times in seconds from which on the fault may act; the best one is taken. Empty: in the whole log.
+    since_s: Vec<f64>,
     /// True if the camera's orientation is the rig's: else it is estimated, whatever it is.
-    pub(super) keeps_orientation: bool,
+    keeps_orientation: bool,
 }
 
 impl Hypothesis {
-    /// A correction of the whole log, with any orientation of the camera.
-    pub(super) fn new(kind: Kind, starts: Vec<Correction>, parameters: &[Parameter]) -> Self {
-        Self { kind, starts, parameters: parameters.to_vec(), since_s: Vec::new(), keeps_orientation: false }
+    /// A fault in the whole log, with any orientation of the camera.
+    pub(super) fn new(starts: Vec<Fault>, fitted: usize) -> Self {
+        Self { starts, fitted, since_s: Vec::new(), keeps_orientation: false }
     }
 
     /// The same from one of these times on.
@@ -68,38 +62,10 @@ impl Hypothesis {
     }
 }
 
-/// Kind of a hypothesis, from which its text is made.
-#[derive(Clone, Debug, PartialEq)]
-pub(in crate::log_check) enum Kind {
-    LeftHanded,
-    GyroscopeScale,
-    Focal,
-    Centre,
-    /// Focal length and principal point.
-    Intrinsics,
-    /// Time offset and its drift.
-    CameraDrift,
-    /// Joints whose readings have the other sign.
-    JointSigns(Vec<usize>),
-    /// Joints are recorded under each other's names.
-    JointOrder,
-    /// Readings of all joints are in another unit.
-    JointUnit,
-    JointScale(usize),
-    JointOffset(usize),
-    JointDelay,
-    /// The mount of the camera moves at a time.
-    Mount,
-    /// The focal length changes: times in seconds from which on a ratio to the rig's holds.
-    FocalPieces(Vec<(f64, f64)>),
-}
-
 /// Fit of a hypothesis.
 #[derive(Clone, Debug)]
 pub(in crate::log_check) struct Fitted {
-    pub(super) kind: Kind,
-    pub(super) correction: Correction,
-    pub(super) since_s: Option<f64>,
+    pub(super) fault: Fault,
     /// Fit of the corrected data.
     pub(super) fit: RotationFit,
     /// Deviance plus the logarithm of the number of measurements per parameter.
@@ -110,7 +76,7 @@ impl Fitted {
     /// True if the correction removes a misfit, in all rotations or, if it begins at a time, in those before or after it: a
     /// larger likelihood alone can be that of a few wrong rotations.
     pub(super) fn removes_misfit(&self, given: &RotationFit) -> bool {
-        let split_s = self.since_s.unwrap_or(f64::NEG_INFINITY);
+        let split_s = self.fault.since_s.unwrap_or(f64::NEG_INFINITY);
         let is_removed = |is_after: bool| {
             let [without, with] = [given, &self.fit].map(|fit| {
                 let part = fit.misfits_rad.iter().filter(|(middle_s, _)| (*middle_s >= split_s) == is_after);
@@ -118,39 +84,7 @@ impl Fitted {
             });
             with < REMOVED_MISFIT * without
         };
-        is_removed(true) || (self.since_s.is_some() && is_removed(false))
-    }
-
-    /// True if the correction is larger than what sound sensors and rigs differ by.
-    pub(super) fn is_noticeable(&self) -> bool {
-        let correction = &self.correction;
-        match &self.kind {
-            Kind::GyroscopeScale => (correction.gyroscope_scale - 1.0).abs() > NOTICEABLE_SCALE,
-            Kind::CameraDrift => correction.camera_drift.abs() > NOTICEABLE_DRIFT,
-            Kind::JointScale(joint) => (correction.joints[*joint].scale - 1.0).abs() > NOTICEABLE_SCALE,
-            Kind::JointOffset(joint) => correction.joints[*joint].offset_rad.abs() > NOTICEABLE_ANGLE_RAD,
-            Kind::JointDelay => correction.joint_delay_s.abs() > NOTICEABLE_DELAY_S,
-            Kind::Mount => correction.mount.angle() > NOTICEABLE_ANGLE_RAD,
-            Kind::LeftHanded
-            | Kind::Focal
-            | Kind::Centre
-            | Kind::Intrinsics
-            | Kind::FocalPieces(_)
-            | Kind::JointSigns(_)
-            | Kind::JointOrder
-            | Kind::JointUnit => true,
-        }
-    }
-
-    /// True if this hypothesis has the other one as a special case: it cannot exclude it by fitting as well.
-    pub(super) fn contains(&self, other: &Self) -> bool {
-        match (&self.kind, &other.kind) {
-            (Kind::FocalPieces(_) | Kind::Intrinsics, Kind::Focal) | (Kind::Intrinsics, Kind::Centre) => true,
-            (Kind::Mount, Kind::JointOffset(_)) => self.since_s.is_some() && other.since_s.is_some(),
-            // Two axes reversed are half a turn about the third: other signs with an offset can be the same mechanism.
-            (Kind::JointSigns(mine), Kind::JointSigns(others)) => others.iter().all(|joint| mine.contains(joint)),
-            (mine, others) => mine == others,
-        }
+        is_removed(true) || (self.fault.since_s.is_some() && is_removed(false))
     }
 }
 
@@ -199,77 +133,66 @@ impl<'a> Fitter<'a> {
         fit.orientation.angle() > self.orientation_tolerance_rad
     }
 
-    /// Rotations with the lens of a correction.
-    fn measured(&self, correction: &Correction) -> Cow<'_, [MeasuredRotation]> {
-        if correction.lens == LensChange::NONE {
-            return Cow::Borrowed(&self.measured);
+    /// Rotations with the lens of a fault.
+    fn measured(&self, fault: Option<&Fault>) -> Cow<'_, [MeasuredRotation]> {
+        match fault.map(Fault::lens) {
+            Some(lens) if lens != LensChange::NONE => {
+                Cow::Owned(joined(&self.data.with_lens(&lens), length_s(self.chain)))
+            }
+            _ => Cow::Borrowed(&self.measured),
         }
-        Cow::Owned(joined(&self.data.with_lens(&correction.lens), length_s(self.chain)))
     }
 
     /// Fit without a correction.
     pub(super) fn fit_given(&self) -> Option<RotationFit> {
-        self.linear_fit(&Correction::none(self.chain.joint_count()), &[], None, &self.priors)
+        self.linear_fit(None, 0, &self.priors)
     }
 
     /// Best fit of a hypothesis over its starts and times.
     pub(super) fn best(&self, hypothesis: Hypothesis) -> Option<Fitted> {
-        let Hypothesis { kind, starts, parameters, since_s, keeps_orientation } = hypothesis;
+        let Hypothesis { starts, fitted, since_s, keeps_orientation } = hypothesis;
         let orientation_rad = if keeps_orientation { KEPT_ORIENTATION_RAD } else { FREE_ORIENTATION_RAD };
         let priors = FitPriors { orientation_rad, ..self.priors };
         let times: Vec<Option<f64>> =
-            if since_s.is_empty() { vec![None] } else { since_s.iter().copied().map(Some).collect() };
-        let mut tried: Vec<(f64, &Correction, Option<f64>)> = Vec::new();
-        for start in &starts {
-            for since_s in &times {
-                if let Some(fit) = self.linear_fit(start, &parameters, *since_s, &priors) {
-                    tried.push((fit.deviance, start, *since_s));
-                }
-            }
-        }
+            if since_s.is_empty() { vec![None] } else { since_s.into_iter().map(Some).collect() };
+        let at = |start: &Fault, since_s: &Option<f64>| Fault { since_s: *since_s, ..start.clone() };
+        let starts = starts.iter().flat_map(|start| times.iter().map(move |since_s| at(start, since_s)));
+        let tried = |start: Fault| Some((self.linear_fit(Some(&start), fitted, &priors)?.deviance, start));
+        let mut tried: Vec<(f64, Fault)> = starts.filter_map(tried).collect();
         tried.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let followed = tried.into_iter().take(FOLLOWED);
-        let fits =
-            followed.filter_map(|(_, start, since_s)| self.converged(&kind, start, &parameters, since_s, &priors));
+        let fits = tried.into_iter().take(FOLLOWED).filter_map(|(_, start)| self.converged(start, fitted, &priors));
         fits.min_by(|a, b| a.criterion.total_cmp(&b.criterion))
     }
 
-    /// Iterates corrections of the data and linear fits until the parameters no longer change.
-    fn converged(
-        &self,
-        kind: &Kind,
-        start: &Correction,
-        parameters: &[Parameter],
-        since_s: Option<f64>,
-        priors: &FitPriors,
-    ) -> Option<Fitted> {
-        let mut correction = if *kind == Kind::Focal { self.best_focal(start) } else { start.clone() };
-        let iterations = if *kind == Kind::Focal || parameters.is_empty() { 0 } else { ITERATIONS };
+    /// Iterates corrections of the data and linear fits until the values no longer change.
+    fn converged(&self, start: Fault, fitted: usize, priors: &FitPriors) -> Option<Fitted> {
+        let is_focal = start.kind == FaultKind::Focal;
+        let mut fault = if is_focal { self.best_focal(&start) } else { start };
+        let iterations = if is_focal || fitted == 0 { 0 } else { ITERATIONS };
         for _ in 0..iterations {
-            let values = self.linear_fit(&correction, parameters, since_s, priors)?.extra;
-            apply(parameters, &values, &mut correction);
-            let change = parameters.iter().zip(&values).map(|(parameter, value)| value.abs() / parameter.step());
-            if change.fold(0.0, f64::max) < CONVERGED {
+            let changes = self.linear_fit(Some(&fault), fitted, priors)?.extra;
+            let mut largest_ratio: f64 = 0.0;
+            for (number, change) in changes.into_iter().enumerate() {
+                let parameter = fault.parameter(number)?;
+                fault.change(number, change.clamp(-parameter.largest, parameter.largest));
+                largest_ratio = largest_ratio.max((change / parameter.step).abs());
+            }
+            if largest_ratio < CONVERGED {
                 break;
             }
         }
         // What is reported is the misfit of corrected data, not that of a linear model of the correction.
-        let fit = self.linear_fit(&correction, &[], since_s, priors)?;
-        let parameters = parameters.len() + usize::from(since_s.is_some());
-        let criterion = self.criterion(&fit, parameters);
-        Some(Fitted { kind: kind.clone(), correction, since_s, fit, criterion })
+        let fit = self.linear_fit(Some(&fault), 0, priors)?;
+        let criterion = self.criterion(&fit, fitted + usize::from(fault.since_s.is_some()));
+        Some(Fitted { fault, fit, criterion })
     }
 
-    /// Correction with the focal length near the start that has the largest likelihood, by golden section: every focal
-    /// length has other measured rotations, and other wrong ones among them.
-    fn best_focal(&self, start: &Correction) -> Correction {
-        let at = |logarithm: f64| {
-            let mut correction = start.clone();
-            correction.lens.focal *= logarithm.exp();
-            correction
-        };
+    /// Fault with the focal length near the start that has the largest likelihood, by golden section: every focal length
+    /// has other measured rotations, and other wrong ones among them.
+    fn best_focal(&self, start: &Fault) -> Fault {
+        let at = |logarithm: f64| Fault::new(start.kind, &[start.value(0) * logarithm.exp()]);
         let deviance = |logarithm: f64| {
-            self.linear_fit(&at(logarithm), &[], None, &self.priors).map_or(f64::INFINITY, |fit| fit.deviance)
+            self.linear_fit(Some(&at(logarithm)), 0, &self.priors).map_or(f64::INFINITY, |fit| fit.deviance)
         };
         let ratio = 0.5 * (5.0_f64.sqrt() - 1.0);
         let (mut low, mut high) = (-FOCAL_RANGE, FOCAL_RANGE);
@@ -289,54 +212,48 @@ impl<'a> Fitter<'a> {
         at(0.5 * (low + high))
     }
 
-    fn linear_fit(
-        &self,
-        correction: &Correction,
-        parameters: &[Parameter],
-        since_s: Option<f64>,
-        priors: &FitPriors,
-    ) -> Option<RotationFit> {
-        let none = Correction::none(self.chain.joint_count());
-        let at = self.pairs(&none, correction, since_s);
+    /// Fit of the data with a fault undone, linear in its first values.
+    fn linear_fit(&self, fault: Option<&Fault>, fitted: usize, priors: &FitPriors) -> Option<RotationFit> {
+        let at = self.pairs(fault);
         if at.len() < MIN_ROTATIONS {
             return None;
         }
-        let column = |parameter: &Parameter| {
-            let step = parameter.step();
-            let mut changed = correction.clone();
-            parameter.add(&mut changed, step);
-            let stepped = self.pairs(&none, &changed, since_s);
+        let column = |number: usize| {
+            let (mut changed, parameter) = (fault?.clone(), fault?.parameter(number)?);
+            changed.change(number, parameter.step);
+            let stepped = self.pairs(Some(&changed));
             // A rotation that the changed data no longer cover does not constrain the parameter.
             let derivative = |of: &dyn Fn(&RotationPair) -> Vector3<f64>| {
                 let quotient = |(key, pair): (&i64, &RotationPair)| {
-                    stepped.get(key).map_or_else(Vector3::zeros, |stepped| (of(stepped) - of(pair)) / step)
+                    stepped.get(key).map_or_else(Vector3::zeros, |stepped| (of(stepped) - of(pair)) / parameter.step)
                 };
                 at.iter().map(quotient).collect::<Vec<_>>()
             };
-            ExtraColumn {
+            Some(ExtraColumn {
                 of_predicted: derivative(&|pair| pair.predicted(self.chain)),
                 of_measured: derivative(&|pair| pair.measured),
-                sigma: parameter.bounds().0,
-            }
+                sigma: parameter.sigma,
+            })
         };
-        let columns: Vec<ExtraColumn> = parameters.iter().map(column).collect();
+        let columns: Vec<ExtraColumn> = (0..fitted).map(column).collect::<Option<_>>()?;
         let pairs: Vec<RotationPair> = at.values().cloned().collect();
         RotationFit::with_columns(&pairs, self.chain, priors, &columns)
     }
 
-    /// Pairs by the stamp of their first image, with one correction before and another one after a time.
-    fn pairs(&self, before: &Correction, after: &Correction, since_s: Option<f64>) -> BTreeMap<i64, RotationPair> {
+    /// Pairs by the stamp of their first image with a fault undone, from its time on.
+    fn pairs(&self, fault: Option<&Fault>) -> BTreeMap<i64, RotationPair> {
         let mut pairs = BTreeMap::new();
-        let mut extend = |correction: &Correction, from_s: f64, to_s: f64| {
-            let predictor = self.data.predictor(self.chain, correction);
-            let measured = self.measured(correction);
+        let mut extend = |fault: Option<&Fault>, from_s: f64, to_s: f64| {
+            let predictor = self.data.predictor(self.chain, fault);
+            let measured = self.measured(fault);
             let within = measured.iter().filter(|it| (from_s..to_s).contains(&it.middle_s()));
             pairs.extend(within.filter_map(|it| Some((it.rotation.from_ns, predictor.pair(it)?))));
         };
+        let since_s = fault.and_then(|fault| fault.since_s);
         let split_s = since_s.unwrap_or(f64::NEG_INFINITY);
-        extend(after, split_s, f64::INFINITY);
+        extend(fault, split_s, f64::INFINITY);
         if since_s.is_some() {
-            extend(before, f64::NEG_INFINITY, split_s);
+            extend(None, f64::NEG_INFINITY, split_s);
         }
         pairs
     }
@@ -344,8 +261,7 @@ impl<'a> Fitter<'a> {
     /// Fit of rotations as measured with another lens each, and their predictions in the frame of the measured rotations
     /// with covariances in rad², by the stamp of the first image.
     pub(super) fn fit_measured(&self, measured: &[MeasuredRotation]) -> Option<(RotationFit, Predictions)> {
-        let none = Correction::none(self.chain.joint_count());
-        let predictor = self.data.predictor(self.chain, &none);
+        let predictor = self.data.predictor(self.chain, None);
         let (keys, pairs): (Vec<i64>, Vec<RotationPair>) =
             measured.iter().filter_map(|it| Some((it.rotation.from_ns, predictor.pair(it)?))).unzip();
         if pairs.len() < MIN_ROTATIONS {
@@ -357,8 +273,7 @@ impl<'a> Fitter<'a> {
 
     /// Predictions by the rig, as [`Self::fit_measured`] returns them.
     pub(super) fn predictions_by_rig(&self, measured: &[MeasuredRotation]) -> Predictions {
-        let none = Correction::none(self.chain.joint_count());
-        let predictor = self.data.predictor(self.chain, &none);
+        let predictor = self.data.predictor(self.chain, None);
         let predicted = |it: &MeasuredRotation| {
             let pair = predictor.pair(it)?;
             Some((it.rotation.from_ns, (pair.predicted(self.chain), pair.covariance_rad2)))
@@ -369,11 +284,3 @@ impl<'a> Fitter<'a> {
 
 /// Predicted rotation vectors and their covariances by the stamp of the first image.
 pub(super) type Predictions = BTreeMap<i64, Prediction>;
-
-/// Adds fitted values to a correction, none by more than its largest change.
-fn apply(parameters: &[Parameter], values: &[f64], correction: &mut Correction) {
-    for (parameter, value) in parameters.iter().zip(values) {
-        let largest = parameter.bounds().1;
-        parameter.add(correction, value.clamp(-largest, largest));
-    }
-}

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::super::correction::{Correction, LensChange};
-use super::fit::{Fitted, Fitter, Kind, Predictions, length_s};
+use super::fit::{Fitted, Fitter, Predictions, length_s};
+use crate::faults::{Fault, FaultKind, LensChange};
 use crate::geometry::so3;
 use crate::log_check::report::ImageRotation;
 use crate::log_check::rotations::data::{MeasuredRotation, joined};
@@ -74,16 +74,14 @@ impl FocalGrid {
             (fit, predictions) = (Some(found), next);
         }
         let (fit, pieces) = (fit?, self.pieces(&chosen));
-        let ratios = || pieces.iter().map(|(_, ratio)| *ratio);
+        let ratios = || pieces.iter().map(|[_, ratio]| *ratio);
         let (low, high) = (ratios().fold(f64::INFINITY, f64::min), ratios().fold(0.0, f64::max));
         if pieces.len() < 2 || high < low * (1.0 + MIN_CHANGE) {
             return None;
         }
         let changes = chosen.windows(2).filter(|pair| pair[0].1 != pair[1].1).count();
         Some(Fitted {
-            kind: Kind::FocalPieces(pieces),
-            correction: Correction::none(fitter.chain.joint_count()),
-            since_s: None,
+            fault: Fault::new(FaultKind::FocalPieces, pieces.as_flattened()),
             criterion: fitter.criterion(&fit, 2 * changes + 1),
             fit,
         })
@@ -138,14 +136,14 @@ impl FocalGrid {
     }
 
     /// Begins in seconds and ratios of the pieces that last long enough.
-    fn pieces(&self, chosen: &[(i64, usize)]) -> Vec<(f64, f64)> {
+    fn pieces(&self, chosen: &[(i64, usize)]) -> Vec<[f64; 2]> {
         let time_s = |key: i64| self.steps[0][&key].middle_s();
-        let mut pieces: Vec<(f64, f64)> = Vec::new();
+        let mut pieces: Vec<[f64; 2]> = Vec::new();
         for piece in chosen.chunk_by(|a, b| a.1 == b.1) {
             let (first, last) = (piece[0], piece[piece.len() - 1]);
-            let near = pieces.last().is_some_and(|(_, before)| (ratio(first.1) / before - 1.0).abs() < MIN_CHANGE);
+            let near = pieces.last().is_some_and(|[_, before]| (ratio(first.1) / before - 1.0).abs() < MIN_CHANGE);
             if time_s(last.0) - time_s(first.0) >= MIN_PIECE_S && !near {
-                pieces.push((time_s(first.0), ratio(first.1)));
+                pieces.push([time_s(first.0), ratio(first.1)]);
             }
         }
         pieces

@@ -6,23 +6,21 @@
 //! noise and no other cause comes near; else those that remain are listed.
 
 mod candidates;
-mod cause;
-mod fault;
 mod fit;
 mod focal_grid;
-mod joint_unit;
-mod text;
 
 use rayon::prelude::*;
 
 use self::candidates::{candidates, intrinsics};
-pub(super) use self::cause::NamedCause;
-use self::fit::{Fitted, Fitter, Hypothesis, Kind, length_s};
+use self::fit::{Fitted, Fitter, Hypothesis, length_s};
 use self::focal_grid::FocalGrid;
 use super::report::{Area, Findings, Severity};
 use super::rotations::data::RotationData;
 use super::rotations::fit::RotationFit;
+use crate::faults::{Fault, FaultKind, Sentence, Subject};
+use crate::geometry::SignedAxes;
 use crate::gimbal::ClassicalChain;
+use crate::sensors::CameraMount;
 
 /// Difference of the criterion by which a hypothesis must be better than another to exclude it: odds of e⁻¹⁰.
 const DECISIVE: f64 = 20.0;
@@ -34,6 +32,15 @@ const DECISIVE_WITHIN_NOISE: f64 = 40.0;
 const MIN_IMPROVEMENT: f64 = 0.5;
 /// The same for χ² of a cause that leaves more than noise explains.
 const UNEXPLAINED_IMPROVEMENT: f64 = 0.1;
+
+/// Cause of a misfit in words and with its value.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct NamedCause {
+    area: Area,
+    pub(super) sentence: Sentence,
+    /// `None` if the fit does not give its value.
+    pub(super) fault: Option<Fault>,
+}
 
 /// Result of a comparison of all hypotheses.
 pub(super) enum Explanation {
@@ -72,7 +79,7 @@ pub(super) fn explain_within_noise(
     let none = WithinNoise { decisive: None, instead_of_orientation: Vec::new(), more_likely: 0 };
     let Some(comparison) = Comparison::new(data, chain, orientation_tolerance_rad) else { return none };
     let given = comparison.criterion_given();
-    let explains = |found: &&Fitted| found.fit.is_explained() && found.is_noticeable();
+    let explains = |found: &&Fitted| found.fit.is_explained() && found.fault.is_noticeable();
     let is_decisive =
         |found: &&Fitted| found.criterion + DECISIVE_WITHIN_NOISE < given && found.removes_misfit(&comparison.given);
     if let Some(best) = comparison.fitted.first().filter(explains).filter(is_decisive) {
@@ -87,7 +94,7 @@ pub(super) fn explain_within_noise(
     let mut listed: Vec<&Fitted> = Vec::new();
     for found in comparison.fitted.iter().filter(instead) {
         // A movement of the mount can always replace a jump of the last joint.
-        if listed.len() + 1 < LISTED && !listed.iter().any(|special| found.contains(special)) {
+        if listed.len() + 1 < LISTED && !listed.iter().any(|special| found.fault.contains(&special.fault)) {
             listed.push(found);
         }
     }
@@ -100,7 +107,27 @@ pub(super) fn explain_within_noise(
 
 /// Cause that a fit describes, in words and with its value.
 fn cause(data: &RotationData<'_>, found: &Fitted) -> NamedCause {
-    NamedCause { fault: fault::fault(data, found), ..text::cause(data, found) }
+    let kind = found.fault.kind;
+    let is_left_handed = kind == FaultKind::GyroscopeAxes;
+    let recorded = if is_left_handed { recorded_axes(data, found) } else { None };
+    let fault = if is_left_handed {
+        recorded.map(|axes| Fault::of_axes(kind, axes))
+    } else {
+        Some(found.fault.clone().of_camera(&data.camera.key))
+    };
+    let subject = Subject { rig: data.rig, camera_key: &data.camera.key };
+    let sentence = subject.by_rotations(&found.fault, recorded.map(|axes| axes.inverse()));
+    NamedCause { area: kind.row().area, sentence, fault }
+}
+
+/// Axes of the rig's IMU as those of a recording with a left-handed frame; the camera's orientation by the rig says which
+/// are exchanged.
+fn recorded_axes(data: &RotationData<'_>, found: &Fitted) -> Option<SignedAxes> {
+    let CameraMount::Static { imu_from_camera } = &data.camera.mount else { return None };
+    // Recorded rates are ω' = P ω; the images measure R₀ ω = −R₁ R₀ ω' with the fitted orientation R₁.
+    let rotation = imu_from_camera.rotation.inverse().to_rotation_matrix().into_inner();
+    let orientation = found.fit.orientation.to_rotation_matrix().into_inner();
+    SignedAxes::nearest(&-(rotation.transpose() * orientation * rotation))
 }
 
 /// Hypotheses about one camera with their fits.
@@ -143,7 +170,7 @@ impl<'a> Comparison<'a> {
     fn add_intrinsics(&mut self) {
         let found = |it: &Fitted| {
             it.fit.is_explained()
-                && it.kind != Kind::GyroscopeScale
+                && it.fault.kind != FaultKind::GyroscopeScale
                 && it.criterion + DECISIVE < self.criterion_given()
                 && it.fit.misfit_rad < MIN_IMPROVEMENT * self.given.misfit_rad
         };
@@ -151,7 +178,7 @@ impl<'a> Comparison<'a> {
             return;
         }
         let grid = FocalGrid::new(&self.fitter);
-        self.add(intrinsics(self.fitter.chain.joint_count(), grid.best_constant()));
+        self.add(intrinsics(grid.best_constant()));
         self.fitted.extend(grid.pieces_fit(&self.fitter));
         self.sort();
     }
@@ -178,8 +205,8 @@ impl<'a> Comparison<'a> {
         // Of two that explain the misfit, a special case is preferred unless it is decisively worse.
         let simpler = |best: &Fitted| {
             fitted.iter().find(|it| {
-                best.contains(it)
-                    && it.kind != best.kind
+                best.fault.contains(&it.fault)
+                    && !it.fault.is_alike(&best.fault)
                     && it.fit.is_explained()
                     && it.criterion < best.criterion + DECISIVE
             })
@@ -187,7 +214,7 @@ impl<'a> Comparison<'a> {
         let Some(best) = fitted.first().map(|best| simpler(best).unwrap_or(best)) else {
             return Explanation::Open(Vec::new());
         };
-        let rival = fitted.iter().find(|other| !other.contains(best));
+        let rival = fitted.iter().find(|other| !other.fault.contains(&best.fault));
         let is_alone = rival.is_none_or(|rival| rival.criterion > best.criterion + DECISIVE);
         if best.fit.is_explained() && is_alone && best.criterion + DECISIVE < self.criterion_given() {
             let (cause, evidence) = self.describe(best);
@@ -200,12 +227,23 @@ impl<'a> Comparison<'a> {
             let improves = is_explained && found.fit.misfit_rad < MIN_IMPROVEMENT * given.misfit_rad
                 || found.fit.mean_square < UNEXPLAINED_IMPROVEMENT * given.mean_square;
             let (cause, evidence) = self.describe(found);
-            if remains && improves && open.len() < LISTED && open.iter().all(|(listed, _)| listed.title != cause.title)
+            if remains
+                && improves
+                && open.len() < LISTED
+                && open.iter().all(|(listed, _)| listed.sentence.statement != cause.sentence.statement)
             {
                 open.push((cause, evidence));
             }
         }
         Explanation::Open(open)
+    }
+}
+
+impl NamedCause {
+    fn report(&self, title: &str, evidence: String, findings: &mut Findings) {
+        let Sentence { severity, remedy, .. } = &self.sentence;
+        findings.add(*severity, self.area, title, evidence, remedy.clone());
+        findings.state_faults(self.fault.clone());
     }
 }
 
@@ -223,8 +261,7 @@ impl Explanation {
         match self {
             Self::Decisive(cause, of_cause) => {
                 let evidence = format!("{of_cause}; as recorded: {evidence}");
-                findings.add(cause.severity, cause.area, cause.title.clone(), evidence, cause.remedy.clone());
-                findings.state_faults(cause.fault.clone());
+                cause.report(&cause.sentence.statement, evidence, findings);
             }
             Self::Open(causes) => {
                 let title =
@@ -233,15 +270,15 @@ impl Explanation {
                     return findings.add(Severity::Warning, Area::Extrinsics, title, evidence, remedy);
                 }
                 if let [(only, of_cause)] = causes.as_slice() {
-                    let title = format!("most likely {}", only.title);
-                    let evidence = format!("{of_cause}; as recorded: {evidence}");
-                    findings.add(only.severity, only.area, title, evidence, only.remedy.clone());
-                    return findings.state_faults(only.fault.clone());
+                    let title = format!("most likely {}", only.sentence.statement);
+                    return only.report(&title, format!("{of_cause}; as recorded: {evidence}"), findings);
                 }
-                let listed: Vec<String> =
-                    causes.iter().map(|(cause, evidence)| format!("{} ({evidence})", cause.title)).collect();
-                let titles: Vec<&str> = causes.iter().map(|(cause, _)| cause.title.as_str()).collect();
-                let remedies: Vec<&str> = causes.iter().map(|(cause, _)| cause.remedy.as_str()).collect();
+                let listed: Vec<String> = causes
+                    .iter()
+                    .map(|(cause, evidence)| format!("{} ({evidence})", cause.sentence.statement))
+                    .collect();
+                let titles: Vec<&str> = causes.iter().map(|(cause, _)| cause.sentence.statement.as_str()).collect();
+                let remedies: Vec<&str> = causes.iter().map(|(cause, _)| cause.sentence.remedy.as_str()).collect();
                 let title = format!("the rotations of {key} differ from the prediction: {}", titles.join(", or "));
                 let evidence = format!("{}; as recorded: {evidence}", listed.join("; or "));
                 findings.add(Severity::Warning, Area::Extrinsics, title, evidence, remedies.join("; or "));

@@ -4,8 +4,8 @@
 use nalgebra::Vector3;
 
 use super::ImuFacts;
+use crate::faults::{Fault, FaultKind};
 use crate::geometry::{SignedAxes, mean, seconds_from_ns};
-use crate::log_check::measured_fault::MeasuredFault;
 use crate::log_check::report::{Area, Findings, Measurement, Severity};
 use crate::sensors::ImuSample;
 
@@ -53,7 +53,7 @@ pub(crate) fn check_imu_axes(imu_facts: &ImuFacts, findings: &mut Findings) {
     }
     let mut all = Vec::new();
     for sign in [1.0, -1.0] {
-        let rates = imu_facts.gyroscope.scaled(sign);
+        let rates = imu_facts.gyroscope.changed(|rate| rate * sign);
         for axes in SignedAxes::all().filter(|axes| !axes.is_left_handed()) {
             let fixed = |(time_s, force): &(f64, Vector3<f64>)| {
                 Some((*time_s, rates.orientation_at(*time_s)? * axes.apply(force)))
@@ -92,7 +92,7 @@ pub(crate) fn check_imu_axes(imu_facts: &ImuFacts, findings: &mut Findings) {
     };
     findings.add(Severity::Error, Area::Imu, title, evidence, CORRECT_AXES);
     if best.sign > 0.0 {
-        findings.state_faults([MeasuredFault::AccelerometerAxes(best.axes.simpler())]);
+        findings.state_faults([Fault::of_axes(FaultKind::AccelerometerAxes, best.axes.simpler())]);
     }
     findings.exclude(Measurement::Accelerometer);
 }

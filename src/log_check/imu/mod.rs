@@ -10,10 +10,10 @@ use nalgebra::Vector3;
 use self::spectrum::{Spectrum, check_noise};
 use self::stationary::{Stamped, StationaryTest, WINDOW_NS, Window};
 use self::unmeasured::check_unmeasured;
-use super::measured_fault::{FaultySource, MeasuredFault};
 use super::report::{Area, Findings, Measurement, Severity};
 use super::statistics::{median, percentile};
 use super::survey::Survey;
+use crate::faults::{Fault, FaultKind};
 use crate::geometry::{mean, seconds_from_ns};
 use crate::sensors::{AngularRates, ImuSample, Rig};
 
@@ -156,21 +156,21 @@ fn check_gravity(
             Severity::Error,
             "accelerations are in g, not m/s²",
             "multiply by 9.80665 in the driver: sensor_msgs/Imu requires m/s²",
-            Some(MeasuredFault::AccelerometerScale(9.806_65)),
+            Some(Fault::new(FaultKind::AccelerometerScale, &[9.806_65])),
         )
     } else if measured < NO_GRAVITY_RATIO * gravity {
         (
             Severity::Error,
             "gravity is already removed from the accelerations",
             "record the raw accelerometer (specific force): linear accelerations of a filter cannot be used",
-            Some(MeasuredFault::Irreversible(FaultySource::Imu)),
+            Some(Fault::from(FaultKind::UnusableImu)),
         )
     } else if let Some(factor) = range_factor.filter(|_| is_scaled) {
         (
             Severity::Error,
             multiple.as_str(),
             "the range setting of the sensor and the scale of its driver differ: correct one of them",
-            Some(MeasuredFault::AccelerometerScale(factor.recip())),
+            Some(Fault::new(FaultKind::AccelerometerScale, &[factor.recip()])),
         )
     } else if difference.abs() > 2.0 {
         (
@@ -249,7 +249,7 @@ fn check_clipping(samples: &[ImuSample], findings: &mut Findings) {
     if largest[0] > 35.0 {
         let remedy = "check the unit: sensor_msgs/Imu requires rad/s, and 35 rad/s is 2000 °/s";
         findings.add(Severity::Error, Area::Imu, "angular velocities appear to be in degrees", evidence, remedy);
-        findings.state_faults([MeasuredFault::GyroscopeScale(std::f64::consts::PI / 180.0)]);
+        findings.state_faults([Fault::new(FaultKind::GyroscopeScale, &[std::f64::consts::PI / 180.0])]);
         findings.exclude(Measurement::Gyroscope);
     } else if !clipped {
         findings.good(Area::Imu, "the IMU does not saturate", evidence);

@@ -9,45 +9,11 @@ use nalgebra::UnitQuaternion;
 use serde::ser::SerializeStruct as _;
 use serde::{Serialize, Serializer};
 
-use super::measured_fault::MeasuredFault;
+use crate::faults::Fault;
+pub use crate::faults::{Area, Severity};
 use crate::frontend::readout::RowTrack;
 use crate::sensors::ImageMask;
 use crate::text::without_signed_zeros;
-
-/// Severity of a finding.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Severity {
-    Good,
-    Note,
-    /// Degrades results or delays initialization.
-    Warning,
-    /// Makes results invalid until it is corrected.
-    Error,
-}
-
-/// Subject of a finding.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Area {
-    /// The file and its topics.
-    Log,
-    /// Time bases, rates, gaps and order of stamps.
-    Time,
-    /// Units, gravity, biases, noise and saturation of the IMU.
-    #[serde(rename = "inertial")]
-    Imu,
-    /// Stationary and hovering periods, fast rotation.
-    Motion,
-    /// Joint angles and their limits.
-    Encoders,
-    /// Size, blur, exposure and texture.
-    Images,
-    /// Camera models and lenses.
-    Intrinsics,
-    /// Poses of the cameras relative to the IMU.
-    Extrinsics,
-}
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Finding {
@@ -64,7 +30,7 @@ pub struct Finding {
     pub is_assumption: bool,
     /// Faults with their values, of which one changes the estimates of a run; empty if none is known.
     #[serde(skip)]
-    pub faults: Vec<MeasuredFault>,
+    pub faults: Vec<Fault>,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -177,7 +143,7 @@ impl Findings {
     }
 
     /// States the fault of the finding that was added last with its value, or the faults one of which it is.
-    pub(super) fn state_faults(&mut self, faults: impl IntoIterator<Item = MeasuredFault>) {
+    pub(super) fn state_faults(&mut self, faults: impl IntoIterator<Item = Fault>) {
         if let Some(last) = self.list.last_mut() {
             last.faults.extend(faults);
         }

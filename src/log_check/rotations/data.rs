@@ -1,15 +1,15 @@
 //! Rotations of a camera between its images with the measurements that predict them, as recorded or with a correction.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
 use super::fit::RotationPair;
 use super::readout::between_first_rows;
+use crate::faults::{Fault, JointMap, LensChange, Sensor, joint_maps};
 use crate::flight_log::stream::angle_fit::FittedAngle;
 use crate::frontend::readout::{RowObservation, RowTrack};
 use crate::geometry::{ns_from_seconds, seconds_from_ns, so3};
 use crate::gimbal::ClassicalChain;
-use crate::log_check::correction::{Correction, JointChange, LensChange};
 use crate::log_check::imu::ImuFacts;
 use crate::log_check::report::ImageRotation;
 use crate::log_check::survey::Survey;
@@ -97,21 +97,25 @@ impl<'a> RotationData<'a> {
         lenses.par_iter().map(|lens| self.with_lens(lens)).collect()
     }
 
-    /// Predictor with a correction; the rotations that it is used for must be measured with the correction's lens.
-    pub(crate) fn predictor<'b>(&'b self, chain: &'b ClassicalChain, correction: &'b Correction) -> Predictor<'b> {
-        let rates = &self.imu_facts.gyroscope;
-        let scaled = (correction.gyroscope_scale != 1.0).then(|| rates.scaled(correction.gyroscope_scale));
-        Predictor { data: self, chain, correction, scaled }
+    /// Predictor with a fault undone; the rotations that it is used for must be measured with the lens of the fault.
+    pub(crate) fn predictor<'b>(&'b self, chain: &'b ClassicalChain, fault: Option<&'b Fault>) -> Predictor<'b> {
+        let corrected = |fault: &Fault| {
+            let rates = &self.imu_facts.gyroscope;
+            fault.corrects(Sensor::Imu).then(|| rates.changed(|rate| fault.angular_velocity(rate)))
+        };
+        let joints = joint_maps(fault, &self.rig.joint_names());
+        Predictor { data: self, chain, fault, joints, rates: fault.and_then(corrected) }
     }
 }
 
-/// Predicts rotations by gyroscope, joints and chain with a correction.
+/// Predicts rotations by gyroscope, joints and chain with a fault undone.
 pub(crate) struct Predictor<'a> {
     data: &'a RotationData<'a>,
     chain: &'a ClassicalChain,
-    correction: &'a Correction,
-    /// Angular rates with the correction, `None` for those recorded.
-    scaled: Option<AngularRates>,
+    fault: Option<&'a Fault>,
+    joints: Vec<JointMap>,
+    /// Corrected angular rates, `None` for those recorded.
+    rates: Option<AngularRates>,
 }
 
 impl Predictor<'_> {
@@ -119,16 +123,16 @@ impl Predictor<'_> {
     pub(crate) fn pair(&self, measured: &MeasuredRotation) -> Option<RotationPair> {
         let rotation = &measured.rotation;
         let corrected_ns = |stamp_ns: i64| {
-            let extra_s = self.correction.camera_delay_s + self.correction.camera_drift * seconds_from_ns(stamp_ns);
+            let extra_s = self.fault.map_or(0.0, |fault| fault.camera_shift_s(seconds_from_ns(stamp_ns)));
             stamp_ns + ns_from_seconds(self.data.camera.timeshift_cam_imu_s + self.data.delay_s + extra_s)
         };
         let (from_ns, to_ns) = (corrected_ns(rotation.from_ns), corrected_ns(rotation.to_ns));
         let [from_s, to_s] = [from_ns, to_ns].map(seconds_from_ns);
         let interval_s = to_s - from_s;
-        let rates = self.scaled.as_ref().unwrap_or(&self.data.imu_facts.gyroscope);
+        let rates = self.rates.as_ref().unwrap_or(&self.data.imu_facts.gyroscope);
         let gyroscope_variance = self.data.rig.imu.noise.gyroscope_noise_density.powi(2);
         // Rotations are compared in the camera frame of the rig.
-        let mount = self.correction.mount.inverse();
+        let mount = self.fault.map_or_else(UnitQuaternion::identity, Fault::mount).inverse();
         let turn = mount.to_rotation_matrix().into_inner();
         let covariance = turn * measured.covariance_rad2 * turn.transpose();
         Some(RotationPair {
@@ -146,17 +150,15 @@ impl Predictor<'_> {
         if self.chain.links.is_empty() {
             return Some(Vec::new());
         }
-        let readings = self.data.survey.fitted_angles_at(stamp_ns + ns_from_seconds(self.correction.joint_delay_s))?;
-        let angle = |joint: &JointChange| {
+        let shift_s = self.fault.map_or(0.0, Fault::joint_shift_s);
+        let readings = self.data.survey.fitted_angles_at(stamp_ns - ns_from_seconds(shift_s))?;
+        let angle = |joint: &JointMap| {
             let reading = readings.get(joint.source)?;
             let variance_rad2 = reading.variance_rad2 * joint.scale * joint.scale;
-            Some(FittedAngle {
-                angle_rad: joint.scale * reading.angle_rad + joint.offset_rad,
-                variance_rad2,
-                ..*reading
-            })
+            let angle_rad = joint.scale * reading.angle_rad + joint.offset_rad;
+            Some(FittedAngle { angle_rad, variance_rad2, ..*reading })
         };
-        self.correction.joints.iter().map(angle).collect()
+        self.joints.iter().map(angle).collect()
     }
 }
 

@@ -2,12 +2,12 @@
 
 use nalgebra::Matrix3;
 
+use crate::faults::{Fault, FaultKind};
 use crate::frontend::readout::{
     FirstRowRotation, ImagePair, ReadoutMeasurement, ReadoutOptions, measure_readout, rotations_of_first_rows,
 };
 use crate::geometry::{ns_from_seconds, seconds_from_ns};
 use crate::log_check::imu::ImuFacts;
-use crate::log_check::measured_fault::MeasuredFault;
 use crate::log_check::report::{Area, Findings, ImageRotation, Severity};
 use crate::sensors::{AngularRates, CameraMount, CameraRig};
 
@@ -55,7 +55,7 @@ pub(crate) fn check_readout(
         };
         let remedy = format!("set {key}.readout to {readout_s:.4} and {key}.readout_sigma to {:.4}", sigma_s.max(1e-4));
         findings.add(Severity::Warning, Area::Time, title, evidence, remedy);
-        findings.state_faults([MeasuredFault::Readout { camera_key: key.clone() }]);
+        findings.state_faults([Fault::from(FaultKind::Shutter).of_camera(key)]);
         return readout_s;
     }
     if sigma_s > USEFUL_SIGMA_S {

@@ -1,9 +1,9 @@
 //! Two publishers on one topic.
 
 use super::used_topics::UsedTopic;
+use crate::faults::FaultKind;
 use crate::flight_log::stamps::spacing::Spacing;
 use crate::geometry::seconds_from_ns;
-use crate::log_check::measured_fault::{FaultySource, MeasuredFault};
 use crate::log_check::report::{Area, Findings, Measurement, Severity};
 use crate::log_check::statistics::{median, percentile};
 use crate::log_check::survey::topic_survey::TopicSurvey;
@@ -44,8 +44,9 @@ pub(super) fn has_two_publishers(
         _ => &[],
     };
     for measurement in mixed {
-        let source = if *measurement == Measurement::Joints { FaultySource::Joints } else { FaultySource::Imu };
-        findings.state_faults([MeasuredFault::Irreversible(source)]);
+        let is_of_joints = *measurement == Measurement::Joints;
+        let kind = if is_of_joints { FaultKind::UnusableJoints } else { FaultKind::UnusableImu };
+        findings.state_faults([kind.into()]);
         findings.exclude(*measurement);
     }
     true

@@ -65,7 +65,7 @@ impl CostBound {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::session::plan::MeasurementCorrection;
+    use crate::faults::{Fault, FaultKind};
 
     /// Steps of a trial with residuals of one length from its first window on.
     fn steps(length_px: f64, first_window: i64) -> Vec<StepMisfit> {
@@ -85,7 +85,7 @@ mod tests {
     }
 
     fn focal() -> ForkChanges {
-        ForkChanges { corrections: vec![MeasurementCorrection::Focal(1.3)], ..ForkChanges::default() }
+        ForkChanges { corrections: vec![Fault::new(FaultKind::Focal, &[1.3])], ..ForkChanges::default() }
     }
 
     #[test]

@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use super::agreement::{self, AgreementValue};
 use super::axes::plausible_axes;
 use super::cost_bound::CostBound;
-use super::hypotheses::{Cause, TrialHypothesis, changes_at, first_hypotheses};
+use super::hypotheses::{TrialHypothesis, changes_at, first_hypotheses};
 use super::log_faults::LogFaults;
 use super::measured::Undoing;
 use super::misfit::Misfit;
@@ -30,11 +30,12 @@ use super::statement::texts;
 use super::trial::{DiagnosedRun, TrialResult, TrialSpan};
 use super::truth;
 use super::tuning::{moved, tuned};
+use crate::faults::FaultKind;
 use crate::geometry::seconds_from_ns;
 use crate::log_check::Finding;
 use crate::sensors::Rig;
 use crate::session::engine::{Computation, History};
-use crate::session::plan::{ForkChanges, MeasurementCorrection};
+use crate::session::plan::ForkChanges;
 use crate::session::record::RunRecord;
 
 /// Causes that are computed again on more of the run.
@@ -243,7 +244,7 @@ impl Search<'_, '_> {
         diagnosis.span_s = Some((self.stamp_s(span.steps.start), self.stamp_s(span.steps.end.saturating_sub(1))));
         let mut ranked = by_cause(&given, others);
         // The columns of both clocks only find values for the shifts.
-        ranked.retain(|it| it.hypothesis.cause != Cause::Clocks || it.hypothesis.changes.estimated.is_empty());
+        ranked.retain(|it| it.hypothesis.cause != FaultKind::Clocks || it.hypothesis.changes.estimated.is_empty());
         let decision = decide(&given, &ranked);
         (diagnosis.verdict, diagnosis.explaining) = match decision {
             RankingDecision::One => (DiagnosisVerdict::Cause, 1),
@@ -264,8 +265,7 @@ impl Search<'_, '_> {
     /// Errors with a change; `None` with another time offset of the camera, because the ground truth of an input is that at
     /// the given one.
     fn accuracy(&self, span: &TrialSpan, candidate: &RankedTrial) -> Option<TruthAgreement> {
-        let is_shift = |it: &MeasurementCorrection| matches!(it, MeasurementCorrection::CameraShift(_));
-        if candidate.hypothesis.changes.corrections.iter().any(is_shift) {
+        if candidate.hypothesis.changes.corrections.iter().any(|it| it.kind == FaultKind::CameraClock) {
             return None;
         }
         let record = RunRecord::new(self.record.spec.clone(), self.record.camera_key.clone());

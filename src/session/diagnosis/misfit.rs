@@ -7,8 +7,8 @@
 
 use super::pixel_histogram::PixelHistogram;
 use crate::estimator::{FactorKind, StepReport};
+use crate::faults::ImageHalf;
 use crate::geometry::{MEDIAN_PLANAR_LENGTH, seconds_from_ns};
-use crate::session::plan::ImageHalf;
 use crate::text::Named as _;
 
 /// χ² of the factors of one kind, and the number of their rows.

@@ -32,6 +32,5 @@ pub use agreement::AgreementValue;
 pub use diagnose::diagnose;
 #[cfg(test)]
 pub(in crate::session) use diagnose::diagnose_run;
-pub use hypotheses::Cause;
 pub use log_faults::LogFaults;
 pub use outcome::{Diagnosis, DiagnosisVerdict, RankedCause, TruthAgreement, WaitingReason};

@@ -5,8 +5,8 @@ use std::fmt;
 use serde::{Serialize, Serializer};
 
 use super::agreement::AgreementValue;
-use super::hypotheses::Cause;
-use crate::log_check::{Finding, Severity};
+use crate::faults::{FaultKind, Severity};
+use crate::log_check::Finding;
 use crate::session::plan::ForkChanges;
 use crate::text::Named as _;
 
@@ -32,7 +32,7 @@ pub enum DiagnosisVerdict {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RankedCause {
     #[serde(serialize_with = "key")]
-    pub cause: Cause,
+    pub cause: FaultKind,
     /// The cause with its value.
     pub statement: String,
     pub remedy: String,
@@ -53,7 +53,7 @@ pub struct RankedCause {
     pub accuracy: Option<TruthAgreement>,
 }
 
-fn key<S: Serializer>(cause: &Cause, serializer: S) -> Result<S::Ok, S::Error> {
+fn key<S: Serializer>(cause: &FaultKind, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_str(cause.name())
 }
 
@@ -247,7 +247,7 @@ fn described(value: &AgreementValue) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::log_check::{Area, MeasuredFault};
+    use crate::faults::{Area, Fault};
 
     #[test]
     fn an_error_of_the_log_precedes_what_the_trials_say() {
@@ -275,7 +275,7 @@ mod tests {
         assert!(diagnosis.to_string().contains("  log          warning: the heading"));
         diagnosis.verdict = DiagnosisVerdict::Agrees;
         assert!(diagnosis.headline().starts_with("nothing to diagnose"), "{}", diagnosis.headline());
-        diagnosis.log_faults[0].faults = vec![MeasuredFault::JointUnit(2.0)];
+        diagnosis.log_faults[0].faults = vec![Fault::new(FaultKind::JointScale, &[2.0])];
         assert!(diagnosis.headline().contains("agree with their noise; the check of the log says: the heading"));
     }
 }

@@ -5,10 +5,10 @@
 //! image that is not used is compared on the other half.
 
 use super::agreement::disagreement;
-use super::hypotheses::{Cause, TrialHypothesis};
+use super::hypotheses::TrialHypothesis;
 use super::misfit::{Misfit, Scale};
 use super::trial::TrialResult;
-use crate::session::plan::MeasurementCorrection;
+use crate::faults::{Choice, Fault, FaultKind};
 
 /// Trial of a hypothesis with its averages over the scored steps.
 #[derive(Clone, Debug)]
@@ -46,7 +46,7 @@ pub(super) enum RankingDecision {
 pub(super) fn score(hypothesis: &TrialHypothesis, misfit: &Misfit, given: &Misfit, scale: &Scale) -> f64 {
     let observations = (scale.observations * scale.windows).max(2.0);
     let mut cost = misfit.cost(scale);
-    if let [MeasurementCorrection::Ignored(half)] = hypothesis.changes.corrections.as_slice() {
+    if let [Fault { choice: Some(Choice::Half(half)), .. }] = hypothesis.changes.corrections.as_slice() {
         let [visual, ..] = given.parts(scale);
         let [_, rest @ ..] = misfit.parts(scale);
         cost = misfit.calibration
@@ -66,7 +66,7 @@ pub(super) fn best<'a>(trials: impl IntoIterator<Item = &'a RankedTrial>) -> Opt
 /// cause.
 pub(super) fn by_cause(given: &RankedTrial, mut candidates: Vec<RankedTrial>) -> Vec<RankedTrial> {
     let is_slight = |it: &RankedTrial| {
-        it.hypothesis.cause == Cause::ImageRegion && given.score - it.score < REGION_RATIO * given.score
+        it.hypothesis.cause == FaultKind::ImageRegion && given.score - it.score < REGION_RATIO * given.score
     };
     candidates.retain(|candidate| !is_slight(candidate));
     candidates.sort_by(|one, other| one.score.total_cmp(&other.score));
@@ -78,7 +78,7 @@ pub(super) fn by_cause(given: &RankedTrial, mut candidates: Vec<RankedTrial>) ->
     }
     if let Some((best, score)) = kept.first().map(|best| (best.hypothesis.cause, best.score)) {
         let margin = margin(given.score - score);
-        let special = kept.iter().position(|it| is_general(best, it.hypothesis.cause) && it.score < score + margin);
+        let special = kept.iter().position(|it| best.contains(it.hypothesis.cause) && it.score < score + margin);
         if let Some(special) = special {
             kept[..=special].rotate_right(1);
         }
@@ -102,29 +102,10 @@ pub(super) fn decide(given: &RankedTrial, ranked: &[RankedTrial]) -> RankingDeci
     // A cause that leaves a disagreement does not compete with one that leaves none.
     let as_good = |it: &&RankedTrial| after > 1.0 || disagreement(&it.misfit) <= 1.0;
     let near = ranked.iter().filter(|candidate| candidate.score < best.score + margin(gain)).filter(as_good);
-    match near.filter(|candidate| !is_general(candidate.hypothesis.cause, best.hypothesis.cause)).count() {
+    match near.filter(|candidate| !candidate.hypothesis.cause.contains(best.hypothesis.cause)).count() {
         0 | 1 => RankingDecision::One,
         count => RankingDecision::Several(count.min(MOST_REMAINING)),
     }
-}
-
-/// True if `cause` contains `best` as a special case, so that it cannot compete with it.
-fn is_general(cause: Cause, best: Cause) -> bool {
-    matches!(
-        (cause, best),
-        (Cause::Clocks, Cause::CameraClock | Cause::EncoderClock)
-            | (Cause::Intrinsics, Cause::Focal)
-            | (
-                Cause::EncoderNoise,
-                Cause::EncoderClock
-                    | Cause::JointOffset
-                    | Cause::JointReversed
-                    | Cause::JointsSwapped
-                    | Cause::JointScale
-                    | Cause::Chain
-            )
-            | (Cause::Chain, Cause::JointOffset)
-    )
 }
 
 #[cfg(test)]
@@ -152,17 +133,17 @@ mod tests {
         Misfit::of(&steps, 0)
     }
 
-    fn candidate(cause: Cause, changes: ForkChanges, length_px: f64, given: &Misfit) -> RankedTrial {
+    fn candidate(cause: FaultKind, changes: ForkChanges, length_px: f64, given: &Misfit) -> RankedTrial {
         let hypothesis = TrialHypothesis::change(cause, changes, 1);
         let misfit = misfit(length_px);
         let score = score(&hypothesis, &misfit, given, &SCALE);
         RankedTrial { hypothesis, result: TrialResult::default(), misfit, score }
     }
 
-    fn decision(given_px: f64, causes: &[(Cause, f64)]) -> (RankingDecision, Vec<Cause>) {
+    fn decision(given_px: f64, causes: &[(FaultKind, f64)]) -> (RankingDecision, Vec<FaultKind>) {
         let given = misfit(given_px);
         let all = causes.iter().map(|(cause, px)| candidate(*cause, ForkChanges::default(), *px, &given)).collect();
-        let given = candidate(Cause::Focal, ForkChanges::default(), given_px, &given);
+        let given = candidate(FaultKind::Focal, ForkChanges::default(), given_px, &given);
         let ranked = by_cause(&given, all);
         let decision = decide(&given, &ranked);
         (decision, ranked.iter().map(|it| it.hypothesis.cause).collect())
@@ -170,14 +151,14 @@ mod tests {
 
     #[test]
     fn one_cause_several_or_none() {
-        let (focal, shutter, chain) = (Cause::Focal, Cause::Shutter, Cause::Chain);
+        let (focal, shutter, chain) = (FaultKind::Focal, FaultKind::Shutter, FaultKind::Chain);
         let (found, order) = decision(1.5, &[(shutter, 0.9), (focal, 0.1), (focal, 0.4), (chain, 1.5)]);
         assert_eq!((found, order), (RankingDecision::One, vec![focal, shutter, chain]));
         assert_eq!(decision(1.5, &[(shutter, 0.1), (focal, 0.1), (chain, 1.5)]).0, RankingDecision::Several(2));
         assert_eq!(decision(1.5, &[(shutter, 1.4), (focal, 1.5)]).0, RankingDecision::None);
         // A more general cause does not compete with its special case.
-        let (found, order) = decision(1.5, &[(Cause::Intrinsics, 0.1), (focal, 0.1)]);
-        assert_eq!((found, order), (RankingDecision::One, vec![focal, Cause::Intrinsics]));
+        let (found, order) = decision(1.5, &[(FaultKind::Intrinsics, 0.1), (focal, 0.1)]);
+        assert_eq!((found, order), (RankingDecision::One, vec![focal, FaultKind::Intrinsics]));
         assert_eq!(decision(1.5, &[]).0, RankingDecision::None);
     }
 
@@ -187,8 +168,8 @@ mod tests {
         let mut wide = misfit(0.1);
         wide.factors[1].rows = 33.0 * wide.tracked as f64;
         let changes = ForkChanges { encoder_noise: 10.0, ..ForkChanges::default() };
-        let hypothesis = TrialHypothesis::change(Cause::EncoderNoise, changes, 1);
-        let plain = TrialHypothesis::change(Cause::EncoderNoise, ForkChanges::default(), 1);
+        let hypothesis = TrialHypothesis::change(FaultKind::EncoderNoise, changes, 1);
+        let plain = TrialHypothesis::change(FaultKind::EncoderNoise, ForkChanges::default(), 1);
         let difference = score(&hypothesis, &wide, &given, &SCALE) - score(&plain, &wide, &given, &SCALE);
         assert!((difference - 4.0 * 33.0 * 2.0 * 10.0_f64.ln()).abs() < 1e-6, "{difference}");
     }

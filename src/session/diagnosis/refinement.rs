@@ -1,12 +1,13 @@
 //! Values of causes from the trials so far: better hypotheses of the same kinds.
 
-use super::hypotheses::{Cause, TrialHypothesis};
+use super::hypotheses::TrialHypothesis;
 use super::ranking::{RankedTrial, best};
 use super::trial::{DiagnosedRun, TrialResult};
 use super::tuning::rounded;
 use crate::estimator::SensorParameters;
+use crate::faults::{Fault, FaultKind, LONGEST_SHIFT_S};
 use crate::gimbal::{ParameterId, ParameterPart, Quantity};
-use crate::session::plan::{ForkChanges, LONGEST_SHIFT_S, MeasurementCorrection};
+use crate::session::plan::ForkChanges;
 
 /// Smallest shift that is worth a trial, in seconds.
 const LEAST_SHIFT_S: f64 = 5e-4;
@@ -26,30 +27,29 @@ pub(super) fn refined(run: &DiagnosedRun<'_>, candidates: &[RankedTrial]) -> Vec
             all.extend(shifts(run, &candidate.result));
         }
         if changes.estimated.contains(&SensorParameters::Intrinsics) {
-            all.extend(focal(run, candidate).map(|factor| {
-                TrialHypothesis::correction(Cause::Focal, MeasurementCorrection::Focal(rounded(factor)))
-            }));
+            let factor = focal(run, candidate).map(rounded);
+            all.extend(factor.map(|factor| TrialHypothesis::correction(Fault::new(FaultKind::Focal, &[factor]))));
         }
     }
-    let best_of = |cause: Cause| {
+    let best_of = |cause: FaultKind| {
         let of_cause = candidates.iter().filter(|it| it.hypothesis.cause == cause && it.hypothesis.from.is_none());
         best(of_cause)
     };
-    if let Some(best) = best_of(Cause::Focal).filter(|_| run.spec.calibrate && !run.spec.intrinsics) {
+    if let Some(best) = best_of(FaultKind::Focal).filter(|_| run.spec.calibrate && !run.spec.intrinsics) {
         // The columns of the intrinsics find the rest of the error from here; the result is refined once more.
         let estimated = [SensorParameters::Intrinsics].into();
         let changes = ForkChanges { estimated, ..best.hypothesis.changes.clone() };
-        all.push(TrialHypothesis::change(Cause::Intrinsics, changes, best.hypothesis.parameters + 4));
+        all.push(TrialHypothesis::change(FaultKind::Intrinsics, changes, best.hypothesis.parameters + 4));
     }
-    if let Some(best) = best_of(Cause::EncoderNoise) {
+    if let Some(best) = best_of(FaultKind::EncoderNoise) {
         let factor = best.hypothesis.changes.encoder_noise * best.misfit.factors[1].mean_square().sqrt();
         if factor > 1.1 && factor < 1e3 {
             let changes = ForkChanges { encoder_noise: rounded(factor), ..ForkChanges::default() };
-            all.push(TrialHypothesis::change(Cause::EncoderNoise, changes, 1));
+            all.push(TrialHypothesis::change(FaultKind::EncoderNoise, changes, 1));
         }
     }
     let noises =
-        candidates.iter().filter(|it| it.hypothesis.cause == Cause::EncoderNoise && it.hypothesis.from.is_none());
+        candidates.iter().filter(|it| it.hypothesis.cause == FaultKind::EncoderNoise && it.hypothesis.from.is_none());
     let widest = noises
         .max_by(|one, other| one.hypothesis.changes.encoder_noise.total_cmp(&other.hypothesis.changes.encoder_noise));
     if let Some(widest) = widest {
@@ -69,13 +69,11 @@ fn shifts(run: &DiagnosedRun<'_>, result: &TrialResult) -> Vec<TrialHypothesis> 
     let camera = value(result, ParameterPart::Camera(0), Quantity::Timeshift).map(|total_s| total_s - given_s);
     let encoder = value(result, ParameterPart::Encoder, Quantity::Timeshift);
     let usable = |shift_s: &f64| (LEAST_SHIFT_S..=LONGEST_SHIFT_S).contains(&shift_s.abs());
-    let camera = camera.filter(usable).map(|shift_s| MeasurementCorrection::CameraShift(rounded(shift_s)));
-    let encoder = encoder.filter(usable).map(|shift_s| MeasurementCorrection::JointShift(rounded(shift_s)));
-    let mut all = Vec::new();
-    all.extend(camera.clone().map(|it| TrialHypothesis::correction(Cause::CameraClock, it)));
-    all.extend(encoder.clone().map(|it| TrialHypothesis::correction(Cause::EncoderClock, it)));
-    if let (Some(camera), Some(encoder)) = (camera, encoder) {
-        all.push(TrialHypothesis::corrections(Cause::Clocks, vec![camera, encoder]));
+    let fault = |kind, shift_s: Option<f64>| shift_s.filter(usable).map(|it| Fault::new(kind, &[rounded(it)]));
+    let both = [fault(FaultKind::CameraClock, camera), fault(FaultKind::EncoderClock, encoder)];
+    let mut all: Vec<TrialHypothesis> = both.iter().flatten().cloned().map(TrialHypothesis::correction).collect();
+    if let [Some(camera), Some(encoder)] = both {
+        all.push(TrialHypothesis::corrections(FaultKind::Clocks, vec![camera, encoder]));
     }
     all
 }
@@ -85,13 +83,7 @@ fn focal(run: &DiagnosedRun<'_>, candidate: &RankedTrial) -> Option<f64> {
     let [fx, fy, ..] = run.rig.camera(run.camera_key).ok()?.model.intrinsics();
     let column = |quantity| value(&candidate.result, ParameterPart::Camera(0), quantity);
     let ratio = 0.5 * (column(Quantity::Fx)? / fx + column(Quantity::Fy)? / fy);
-    let known: f64 = candidate
-        .hypothesis
-        .changes
-        .corrections
-        .iter()
-        .map(|correction| if let MeasurementCorrection::Focal(factor) = correction { *factor } else { 1.0 })
-        .product();
+    let known: f64 = candidate.hypothesis.changes.corrections.iter().map(|fault| fault.lens().focal).product();
     let factor = known * ratio;
     ((factor - 1.0).abs() > LEAST_FOCAL && (0.1..10.0).contains(&factor)).then_some(factor)
 }
@@ -110,10 +102,7 @@ fn offsets(run: &DiagnosedRun<'_>, result: &TrialResult) -> Vec<TrialHypothesis>
             .collect();
         let Some((step, before, after)) = change_point(&differences) else { continue };
         let offset = |offset_rad: f64| {
-            TrialHypothesis::correction(
-                Cause::JointOffset,
-                MeasurementCorrection::Offset(name.clone(), rounded(offset_rad)),
-            )
+            TrialHypothesis::correction(Fault::new(FaultKind::JointOffset, &[rounded(offset_rad)]).of_joints([&name]))
         };
         if (after - before).abs() > LEAST_OFFSET_RAD {
             all.push(offset(after - before).starting(step));

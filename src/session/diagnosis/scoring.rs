@@ -1,9 +1,10 @@
 //! Trials of one span on one scale.
 
-use super::hypotheses::{Cause, TrialHypothesis};
+use super::hypotheses::TrialHypothesis;
 use super::misfit::{Misfit, Scale};
 use super::ranking::{RankedTrial, score};
 use super::trial::TrialResult;
+use crate::faults::FaultKind;
 use crate::session::plan::ForkChanges;
 
 /// Ratio of the steps with a window below which a run is lost.
@@ -38,7 +39,7 @@ pub(super) fn scored(given: TrialResult, done: Vec<(TrialHypothesis, TrialResult
         let score = score(&hypothesis, &misfit, &given_misfit, &scale);
         RankedTrial { hypothesis, result, misfit, score }
     };
-    let unchanged = TrialHypothesis::change(Cause::Chain, ForkChanges::default(), 0);
+    let unchanged = TrialHypothesis::change(FaultKind::Chain, ForkChanges::default(), 0);
     let others = done.into_iter().zip(misfits).map(|((it, result), misfit)| candidate(it, result, misfit)).collect();
     Trials { given: candidate(unchanged, given, given_misfit.clone()), others }
 }

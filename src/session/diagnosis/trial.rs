@@ -8,10 +8,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::cost_bound::CostBound;
 use super::misfit::StepMisfit;
 use crate::estimator::StepReport;
+use crate::faults::FaultKind;
 use crate::gimbal::{ClassicalChain, ParameterId};
 use crate::sensors::Rig;
 use crate::session::engine::{OwnedStepInput, RunEngine, apply_fork, guarded};
-use crate::session::plan::{ForkChanges, MeasurementCorrection, RunSpec};
+use crate::session::plan::{ForkChanges, RunSpec};
 use crate::session::record::RunRecord;
 
 /// The run to be diagnosed.
@@ -128,11 +129,8 @@ impl DiagnosedRun<'_> {
 
 /// Scale of the pixels that the estimator uses, relative to those of the image.
 fn pixel_scale(changes: &ForkChanges) -> f64 {
-    let factors = changes.corrections.iter().filter_map(|correction| match correction {
-        MeasurementCorrection::Focal(factor) | MeasurementCorrection::Zoom(factor, _) => Some(factor.recip()),
-        _ => None,
-    });
-    factors.product()
+    let focal = changes.corrections.iter().filter(|it| matches!(it.kind, FaultKind::Focal | FaultKind::Zoom));
+    focal.map(|fault| fault.value(0).recip()).product()
 }
 
 impl TrialResult {

@@ -1,15 +1,14 @@
 //! Values and steps around those of the best trials.
 
-use super::hypotheses::{Cause, TrialHypothesis};
+use super::hypotheses::TrialHypothesis;
 use super::ranking::{RankedTrial, best};
 use super::scoring::Trials;
-use crate::session::plan::MeasurementCorrection;
+use crate::faults::{Fault, FaultKind};
 
 /// Steps around that of the best change which are tried.
 const MOVES: [isize; 8] = [-16, -8, -4, -2, -1, 1, 2, 4];
-/// Ratios of the values that are tried before a parabola has three points.
-const SPREAD: [f64; 2] = [0.94, 1.06];
-const SPREAD_S: [f64; 2] = [0.6, 1.6];
+/// Ratios of the first and the second value of a fault that are tried before a parabola has three points.
+const SPREADS: [[f64; 2]; 2] = [[0.94, 1.06], [0.6, 1.6]];
 
 /// The best change that begins at a step, at other steps around it.
 pub(super) fn moved(trials: &Trials) -> Vec<TrialHypothesis> {
@@ -23,54 +22,36 @@ pub(super) fn moved(trials: &Trials) -> Vec<TrialHypothesis> {
 /// Values around those of the best offset of a joint and the best zoom.
 pub(super) fn tuned(candidates: &[RankedTrial]) -> Vec<TrialHypothesis> {
     let mut all = Vec::new();
-    for cause in [Cause::JointOffset, Cause::Zoom] {
-        let of_cause = candidates.iter().filter(|it| it.hypothesis.cause == cause);
-        let Some(best) = best(of_cause) else { continue };
+    for cause in [FaultKind::JointOffset, FaultKind::Zoom] {
+        let Some(best) = best(candidates.iter().filter(|it| it.hypothesis.cause == cause)) else { continue };
         let hypothesis = &best.hypothesis;
-        let with = |correction: MeasurementCorrection| {
-            let mut changed = hypothesis.clone();
-            changed.changes.corrections = vec![correction];
-            changed
-        };
-        match hypothesis.changes.corrections.as_slice() {
-            [MeasurementCorrection::Offset(joint, offset_rad)] => {
-                let same = |it: &MeasurementCorrection| match it {
-                    MeasurementCorrection::Offset(other, value) if other == joint => Some(*value),
-                    _ => None,
-                };
-                let values = around(*offset_rad, &SPREAD, &known(candidates, hypothesis, same));
-                all.extend(values.into_iter().map(|value| with(MeasurementCorrection::Offset(joint.clone(), value))));
+        let [fault] = hypothesis.changes.corrections.as_slice() else { continue };
+        for (number, (value, spread)) in fault.values.iter().zip(&SPREADS).enumerate() {
+            for tuned in around(*value, spread, &known(candidates, hypothesis, fault, number)) {
+                let mut changed = hypothesis.clone();
+                changed.changes.corrections = vec![with_value(fault, number, tuned)];
+                all.push(changed);
             }
-            [MeasurementCorrection::Zoom(factor, over_s)] => {
-                let same_time = |it: &MeasurementCorrection| match it {
-                    MeasurementCorrection::Zoom(value, other_s) if other_s == over_s => Some(*value),
-                    _ => None,
-                };
-                let same_factor = |it: &MeasurementCorrection| match it {
-                    MeasurementCorrection::Zoom(other, value_s) if other == factor => Some(*value_s),
-                    _ => None,
-                };
-                let factors = around(*factor, &SPREAD, &known(candidates, hypothesis, same_time));
-                all.extend(factors.into_iter().map(|value| with(MeasurementCorrection::Zoom(value, *over_s))));
-                let times_s = around(*over_s, &SPREAD_S, &known(candidates, hypothesis, same_factor));
-                all.extend(times_s.into_iter().map(|value_s| with(MeasurementCorrection::Zoom(*factor, value_s))));
-            }
-            _ => {}
         }
     }
     all
 }
 
-/// Values with their scores of trials that differ from a hypothesis in one value only.
-fn known(
-    candidates: &[RankedTrial],
-    hypothesis: &TrialHypothesis,
-    value: impl Fn(&MeasurementCorrection) -> Option<f64>,
-) -> Vec<(f64, f64)> {
+fn with_value(fault: &Fault, number: usize, value: f64) -> Fault {
+    let mut changed = fault.clone();
+    changed.values[number] = value;
+    changed
+}
+
+/// Values with a number, and scores, of trials that differ from the fault of a hypothesis in this value only.
+fn known(candidates: &[RankedTrial], hypothesis: &TrialHypothesis, fault: &Fault, number: usize) -> Vec<(f64, f64)> {
     let alike = candidates.iter().filter(|it| it.hypothesis.from == hypothesis.from);
     alike
         .filter_map(|it| match it.hypothesis.changes.corrections.as_slice() {
-            [correction] => Some((value(correction)?, it.score)),
+            [other] if other.kind == fault.kind => {
+                let value = other.values[number];
+                (*other == with_value(fault, number, value)).then_some((value, it.score))
+            }
             _ => None,
         })
         .collect()
@@ -106,10 +87,10 @@ mod tests {
 
     #[test]
     fn values_go_to_the_lowest_point_of_a_parabola() {
-        assert_eq!(around(2.0, &SPREAD, &[(2.0, 5.0)]), [1.88, 2.12]);
+        assert_eq!(around(2.0, &SPREADS[0], &[(2.0, 5.0)]), [1.88, 2.12]);
         let score = |value: f64| 3.0 + 10.0 * (value - 1.5).powi(2);
         let known = [1.2, 1.4, 1.7].map(|value| (value, score(value)));
-        assert_eq!(around(1.4, &SPREAD, &known), [1.5]);
+        assert_eq!(around(1.4, &SPREADS[0], &known), [1.5]);
         assert_eq!(rounded(0.769_488_888), 0.7695);
         assert_eq!(rounded(-0.014_654_139), -0.014_65);
         assert_eq!(rounded(0.0), 0.0);

@@ -1,12 +1,13 @@
 //! Corrections of a fork, applied to the measurements of its steps.
 
-use nalgebra::{Matrix3, Vector2};
+use nalgebra::Vector2;
 
 use crate::camera::CameraModel;
+use crate::faults::{Fault, FaultKind, Sensor, correct_joint_angles};
 use crate::frontend::{TrackedFeature, TrackedFrame};
 use crate::geometry::{ns_from_seconds, seconds_from_ns};
 use crate::sensors::{ImuSample, JointAngles, Rig};
-use crate::session::plan::{ForkError, ImageFlip, ImageHalf, MeasurementCorrection};
+use crate::session::plan::ForkError;
 
 /// Steps of a fork with another offset of a joint whose readings are not used.
 const UNREAD_STEPS: usize = 2;
@@ -16,35 +17,13 @@ const UNREAD_STEPS: usize = 2;
 pub(super) struct MeasurementCorrections {
     /// Model of the main camera in the rig; `None` without a correction of its images.
     camera: Option<CameraModel>,
-    image: Vec<ImageCorrection>,
-    joints: Vec<JointCorrection>,
-    /// `imu_from_recorded` of angular velocities and specific forces, where they are corrected.
-    imu: Option<[Matrix3<f64>; 2]>,
-    /// Additions to the time offsets of cameras and encoders, in seconds.
-    camera_shift_s: f64,
-    joint_shift_s: f64,
+    joint_names: Vec<String>,
+    /// In the order in which they are applied.
+    faults: Vec<Fault>,
     /// Stamp of the first step of the fork; `None` before it.
     start_ns: Option<i64>,
     /// Number of steps from then on without joint angles: readings within a change of an offset are in between.
     unread: usize,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum ImageCorrection {
-    Focal(f64),
-    /// Factor, and the seconds over which it is reached.
-    Zoom(f64, f64),
-    Flip(ImageFlip),
-    Ignored(ImageHalf),
-}
-
-/// Correction of readings by the indices of their joints.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum JointCorrection {
-    Reversed(usize),
-    Swapped(usize, usize),
-    Offset(usize, f64),
-    Scale(f64),
 }
 
 impl MeasurementCorrections {
@@ -52,67 +31,27 @@ impl MeasurementCorrections {
     ///
     /// # Errors
     /// If the rig has no such joint.
-    pub(super) fn of(corrections: &[MeasurementCorrection], rig: &Rig, camera_key: &str) -> Result<Self, ForkError> {
-        let names = rig.joint_names();
-        let joint = |name: &String| {
-            names.iter().position(|known| known == name).ok_or_else(|| ForkError::BadChange {
+    pub(super) fn of(faults: &[Fault], rig: &Rig, camera_key: &str) -> Result<Self, ForkError> {
+        let joint_names = rig.joint_names();
+        if let Some(name) = faults.iter().flat_map(|fault| &fault.joints).find(|name| !joint_names.contains(name)) {
+            return Err(ForkError::BadChange {
                 text: format!("correct=…:{name}"),
-                problem: format!("the rig has no joint '{name}'; it has: {}", names.join(", ")),
-            })
-        };
-        let mut found = Self::default();
-        for correction in corrections {
-            match correction {
-                MeasurementCorrection::Focal(factor) => found.image.push(ImageCorrection::Focal(*factor)),
-                MeasurementCorrection::Zoom(factor, over_s) => {
-                    found.image.push(ImageCorrection::Zoom(*factor, *over_s));
-                }
-                MeasurementCorrection::Image(flip) => found.image.push(ImageCorrection::Flip(*flip)),
-                MeasurementCorrection::Ignored(half) => found.image.push(ImageCorrection::Ignored(*half)),
-                MeasurementCorrection::CameraShift(shift_s) => found.camera_shift_s += shift_s,
-                MeasurementCorrection::JointShift(shift_s) => found.joint_shift_s += shift_s,
-                MeasurementCorrection::Reversed(name) => found.joints.push(JointCorrection::Reversed(joint(name)?)),
-                MeasurementCorrection::Swapped(first, second) => {
-                    found.joints.push(JointCorrection::Swapped(joint(first)?, joint(second)?));
-                }
-                MeasurementCorrection::Offset(name, offset) => {
-                    found.joints.push(JointCorrection::Offset(joint(name)?, *offset));
-                    found.unread = UNREAD_STEPS;
-                }
-                MeasurementCorrection::JointScale(factor) => found.joints.push(JointCorrection::Scale(*factor)),
-                MeasurementCorrection::ImuAxes(axes) => found.rotate([axes.matrix(), axes.matrix()]),
-                MeasurementCorrection::GyroscopeAxes(axes) => found.rotate([axes.matrix(), Matrix3::identity()]),
-                MeasurementCorrection::AccelerometerAxes(axes) => found.rotate([Matrix3::identity(), axes.matrix()]),
-                MeasurementCorrection::GyroscopeScale(factor) => {
-                    found.rotate([Matrix3::identity() * *factor, Matrix3::identity()]);
-                }
-                MeasurementCorrection::AccelerometerScale(factor) => {
-                    found.rotate([Matrix3::identity(), Matrix3::identity() * *factor]);
-                }
-            }
+                problem: format!("the rig has no joint '{name}'; it has: {}", joint_names.join(", ")),
+            });
         }
-        if !found.image.is_empty() {
-            found.camera = rig.camera(camera_key).ok().map(|camera| camera.model.clone());
-        }
-        Ok(found)
+        let changes_images = faults.iter().any(|fault| fault.corrects(Sensor::Camera));
+        let camera = rig.camera(camera_key).ok().filter(|_| changes_images).map(|camera| camera.model.clone());
+        let has_offset = faults.iter().any(|fault| fault.kind == FaultKind::JointOffset);
+        let unread = if has_offset { UNREAD_STEPS } else { 0 };
+        Ok(Self { camera, joint_names, faults: faults.to_vec(), start_ns: None, unread })
     }
 
     /// Adds the corrections of a fork to those of its parent.
     pub(super) fn add(&mut self, other: Self) {
         self.camera = other.camera.or_else(|| self.camera.take());
-        self.image.extend(other.image);
-        self.joints.extend(other.joints);
-        if let Some(matrices) = other.imu {
-            self.rotate(matrices);
-        }
-        self.camera_shift_s += other.camera_shift_s;
-        self.joint_shift_s += other.joint_shift_s;
+        self.joint_names = other.joint_names;
+        self.faults.extend(other.faults);
         (self.start_ns, self.unread) = (None, other.unread);
-    }
-
-    fn rotate(&mut self, [gyroscope, accelerometer]: [Matrix3<f64>; 2]) {
-        let [before, of_force] = self.imu.unwrap_or_else(|| [Matrix3::identity(); 2]);
-        self.imu = Some([gyroscope * before, accelerometer * of_force]);
     }
 
     /// Takes note of the next step; true if its joint angles are not used.
@@ -124,7 +63,7 @@ impl MeasurementCorrections {
     }
 
     pub(super) fn camera_shift_ns(&self) -> i64 {
-        ns_from_seconds(self.camera_shift_s)
+        ns_from_seconds(self.faults.iter().map(|fault| fault.camera_shift_s(0.0)).sum())
     }
 
     /// The main camera's tracks, `None` without a correction of images; features outside the domain of the camera model
@@ -134,105 +73,33 @@ impl MeasurementCorrections {
     /// rig's, their errors are `1/F` times those in the image.
     pub(super) fn tracks(&self, tracks: &TrackedFrame) -> Option<TrackedFrame> {
         let camera = self.camera.as_ref()?;
+        let since_s = self.start_ns.map_or(0.0, |start_ns| seconds_from_ns(tracks.stamp_ns - start_ns));
+        let corrected = |uv_px: Vector2<f64>| {
+            self.faults.iter().try_fold(uv_px, |uv_px, fault| fault.pixel(camera, uv_px, since_s))
+        };
         let features = tracks.features.iter().filter_map(|feature| {
-            let uv_px = self.place(camera, feature.uv_px, tracks.stamp_ns)?;
-            let previous_uv_px = feature.previous_uv_px.and_then(|uv_px| self.place(camera, uv_px, tracks.stamp_ns));
+            let uv_px = corrected(feature.uv_px)?;
+            let previous_uv_px = feature.previous_uv_px.and_then(corrected);
             let bearing = camera.unproject(&uv_px)?;
             Some(TrackedFeature { uv_px, previous_uv_px, bearing, ..*feature })
         });
         Some(TrackedFrame { features: features.collect(), ..tracks.clone() })
     }
 
-    fn place(&self, camera: &CameraModel, uv_px: Vector2<f64>, stamp_ns: i64) -> Option<Vector2<f64>> {
-        let [width, height] = camera.resolution_px.map(|size| size as f64);
-        self.image.iter().try_fold(uv_px, |uv_px, correction| match correction {
-            ImageCorrection::Focal(factor) => with_focal_factor(camera, *factor, &uv_px),
-            ImageCorrection::Zoom(factor, over_s) => {
-                let since_s = self.start_ns.map_or(0.0, |start_ns| seconds_from_ns(stamp_ns - start_ns));
-                let reached = if *over_s > 0.0 { (since_s / over_s).clamp(0.0, 1.0) } else { 1.0 };
-                with_focal_factor(camera, 1.0 + (factor - 1.0) * reached, &uv_px)
-            }
-            ImageCorrection::Flip(flip) => {
-                let (left, top) = (width - 1.0 - uv_px.x, height - 1.0 - uv_px.y);
-                Some(match flip {
-                    ImageFlip::Mirrored => Vector2::new(left, uv_px.y),
-                    ImageFlip::Flipped => Vector2::new(uv_px.x, top),
-                    ImageFlip::UpsideDown => Vector2::new(left, top),
-                })
-            }
-            ImageCorrection::Ignored(half) => (!half.contains(&uv_px, camera.resolution_px)).then_some(uv_px),
-        })
-    }
-
     /// Corrected samples, `None` without a correction of the IMU.
     pub(super) fn imu(&self, samples: &[ImuSample]) -> Option<Vec<ImuSample>> {
-        let [gyroscope, accelerometer] = self.imu?;
-        let corrected = samples.iter().map(|sample| ImuSample {
-            stamp_ns: sample.stamp_ns,
-            angular_velocity_rad_per_s: gyroscope * sample.angular_velocity_rad_per_s,
-            specific_force_m_per_s2: accelerometer * sample.specific_force_m_per_s2,
-        });
-        Some(corrected.collect())
+        let of_imu: Vec<&Fault> = self.faults.iter().filter(|fault| fault.corrects(Sensor::Imu)).collect();
+        let corrected = |sample: &ImuSample| of_imu.iter().fold(*sample, |sample, fault| fault.imu_sample(&sample));
+        (!of_imu.is_empty()).then(|| samples.iter().map(corrected).collect())
     }
 
-    /// Corrects the readings at an image; shifts follow the parabola of each joint.
+    /// Corrects the readings at an image.
     pub(super) fn joint_angles(&self, angles: &mut JointAngles) {
-        let count = angles.angles_rad.len();
-        for correction in &self.joints {
-            match *correction {
-                JointCorrection::Reversed(joint) if joint < count => scale(angles, joint, -1.0),
-                JointCorrection::Scale(factor) => (0..count).for_each(|joint| scale(angles, joint, factor)),
-                JointCorrection::Offset(joint, offset_rad) if joint < count => angles.angles_rad[joint] += offset_rad,
-                JointCorrection::Swapped(first, second) if first.max(second) < count => swap(angles, first, second),
-                JointCorrection::Reversed(_) | JointCorrection::Offset(..) | JointCorrection::Swapped(..) => {}
-            }
-        }
-        let after_s = self.camera_shift_s - self.joint_shift_s;
-        if after_s == 0.0 {
-            return;
-        }
-        for joint in 0..count {
-            let rate = angles.rates_rad_per_s.get(joint).copied().unwrap_or(0.0);
-            let acceleration = angles.motion_fits.get(joint).map_or(0.0, |fit| fit.acceleration_rad_per_s2);
-            angles.angles_rad[joint] += after_s * (rate + 0.5 * after_s * acceleration);
-            if let Some(rate) = angles.rates_rad_per_s.get_mut(joint) {
-                *rate += after_s * acceleration;
-            }
-        }
+        correct_joint_angles(&self.faults, &self.joint_names, angles);
     }
 
     pub(super) fn changes_joints(&self) -> bool {
-        !self.joints.is_empty() || self.camera_shift_s != self.joint_shift_s
-    }
-}
-
-/// Pixel at which the rig's camera sees the direction of a pixel of a camera with other focal lengths.
-fn with_focal_factor(camera: &CameraModel, factor: f64, uv_px: &Vector2<f64>) -> Option<Vector2<f64>> {
-    let [fx, fy, cx, cy, k1, k2] = camera.intrinsics();
-    let corrected = camera.with_intrinsics([fx * factor, fy * factor, cx, cy, k1, k2]).ok()?;
-    camera.project(&corrected.unproject(uv_px)?)
-}
-
-fn scale(angles: &mut JointAngles, joint: usize, factor: f64) {
-    angles.angles_rad[joint] *= factor;
-    if let Some(rate) = angles.rates_rad_per_s.get_mut(joint) {
-        *rate *= factor;
-    }
-    if let Some(fit) = angles.motion_fits.get_mut(joint) {
-        fit.acceleration_rad_per_s2 *= factor;
-    }
-}
-
-fn swap(angles: &mut JointAngles, first: usize, second: usize) {
-    let lists =
-        [&mut angles.angles_rad, &mut angles.sigmas_rad, &mut angles.lasting_sigmas_rad, &mut angles.rates_rad_per_s];
-    for list in lists {
-        if first.max(second) < list.len() {
-            list.swap(first, second);
-        }
-    }
-    if first.max(second) < angles.motion_fits.len() {
-        angles.motion_fits.swap(first, second);
+        self.faults.iter().any(|fault| fault.corrects(Sensor::Joints) || fault.kind == FaultKind::CameraClock)
     }
 }
 
@@ -245,7 +112,7 @@ mod tests {
 
     fn corrections(texts: &[&str]) -> Result<(MeasurementCorrections, Rig), ForkError> {
         let flight = synthetic_tracks(&SyntheticOptions { duration_s: 0.1, ..SyntheticOptions::default() });
-        let all: Vec<MeasurementCorrection> = texts.iter().map(|text| text.parse().unwrap()).collect();
+        let all: Vec<Fault> = texts.iter().map(|text| text.parse().unwrap()).collect();
         Ok((MeasurementCorrections::of(&all, &flight.given_rig, "cam0")?, flight.given_rig))
     }
 

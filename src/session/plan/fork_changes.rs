@@ -4,9 +4,9 @@ use std::collections::BTreeSet;
 
 use thiserror::Error;
 
-use super::correction::MeasurementCorrection;
 use super::run_spec::{ParameterizationChoice, RunSpec};
 use crate::estimator::{InterventionError, SensorParameters};
+use crate::faults::Fault;
 use crate::text::Named as _;
 
 /// The changes of a fork against its parent run.
@@ -40,7 +40,7 @@ pub struct ForkChanges {
     /// Scale factor of the rig's standard deviations of the chain (`chain-prior=`).
     pub chain_prior: f64,
     /// Errors of recording or rig that are undone (`correct=`).
-    pub corrections: Vec<MeasurementCorrection>,
+    pub corrections: Vec<Fault>,
 }
 
 impl Default for ForkChanges {

@@ -3,11 +3,11 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::correction::MeasurementCorrection;
 use super::fork_changes::{FORK_PARAMETERIZATIONS, ForkChanges, ForkError, OTHER_CAMERA};
 use super::run_options::{encoder_noise, imu_noise, pixel_noise};
 use super::run_spec::ParameterizationChoice;
 use crate::estimator::SensorParameters;
+use crate::faults::Fault;
 use crate::text::{Entry, Field, Key, Named as _, items, read_entry, written_items};
 
 /// Reason why a fork cannot use encoder readings that its parent does not use.
@@ -95,9 +95,7 @@ impl ForkChanges {
             "ERROR+…",
             "errors of recording or rig that are undone, as `dcvins diagnose` names them: `focal:0.77`, `reversed:yaw`, \
              `camera-shift:15ms`, `imu-axes:y/x/z`",
-            Field::Other(read_corrections, |changes| {
-                joined(changes.corrections.iter().map(MeasurementCorrection::to_string))
-            }),
+            Field::Other(read_corrections, |changes| joined(changes.corrections.iter().map(Fault::to_string))),
         ),
     ];
 }

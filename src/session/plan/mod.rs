@@ -1,6 +1,5 @@
 //! The definition of a session: the log with its rig, its runs, and the changes of a fork. Plain data.
 
-mod correction;
 mod error;
 mod flight_prior;
 mod fork_changes;
@@ -11,8 +10,6 @@ mod session_plan;
 mod trajectories;
 mod trajectory_spec;
 
-pub(in crate::session) use correction::LONGEST_SHIFT_S;
-pub use correction::{ImageFlip, ImageHalf, MeasurementCorrection};
 pub use error::SessionError;
 pub use flight_prior::{FlightPrior, FlightSigmas};
 pub use fork_changes::{FORK_PARAMETERIZATIONS, ForkChanges, ForkError};

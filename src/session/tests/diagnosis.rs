@@ -3,11 +3,12 @@
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use crate::log_check::{Area, FaultySource, Finding, MeasuredFault, Severity};
+use crate::faults::{Area, Fault, FaultKind, Severity, correct_joint_angles};
+use crate::log_check::Finding;
 use crate::sensors::Rig;
-use crate::session::diagnosis::{Cause, Diagnosis, DiagnosisVerdict, diagnose_run};
+use crate::session::diagnosis::{Diagnosis, DiagnosisVerdict, diagnose_run};
 use crate::session::engine::{History, OwnedStepInput, RunEngine, estimator_config};
-use crate::session::plan::{MeasurementCorrection, RunSpec};
+use crate::session::plan::RunSpec;
 use crate::session::record::RunRecord;
 use crate::session::tests::memory::{estimated_step, input_of};
 use crate::simulation::{SyntheticOptions, synthetic_tracks};
@@ -20,7 +21,7 @@ fn diagnosed(
     duration_s: f64,
     rig_fault: impl Fn(&mut Rig),
     input_fault: impl Fn(&mut OwnedStepInput, &Rig),
-    measured: &[MeasuredFault],
+    measured: &[Fault],
 ) -> Diagnosis {
     let flight = synthetic_tracks(&SyntheticOptions { duration_s, ..SyntheticOptions::default() });
     let mut rig = flight.given_rig.clone();
@@ -44,7 +45,7 @@ fn diagnosed(
     diagnose_run(&rig, &record, &history, &findings, &mut |_, _| ControlFlow::Continue(()))
 }
 
-fn error_of(fault: &MeasuredFault) -> Finding {
+fn error_of(fault: &Fault) -> Finding {
     Finding {
         severity: Severity::Error,
         area: Area::Encoders,
@@ -82,10 +83,9 @@ fn a_wrong_focal_length_is_named_with_its_value() {
         input.tracks[0] = Arc::new(tracks);
     };
     let found = diagnosed(4.0, longer, bearings, &[]);
-    assert_eq!((found.verdict, found.causes[0].cause), (DiagnosisVerdict::Cause, Cause::Focal), "{found}");
-    let [MeasurementCorrection::Focal(factor)] = found.causes[0].changes.corrections.as_slice() else {
-        panic!("{found}")
-    };
+    assert_eq!((found.verdict, found.causes[0].cause), (DiagnosisVerdict::Cause, FaultKind::Focal), "{found}");
+    let [focal] = found.causes[0].changes.corrections.as_slice() else { panic!("{found}") };
+    let factor = focal.value(0);
     assert!((factor * 1.1 - 1.0).abs() < 0.01, "{factor}");
     assert!(found.causes[0].values.iter().all(|value| value.agrees()), "{found}");
 }
@@ -93,17 +93,18 @@ fn a_wrong_focal_length_is_named_with_its_value() {
 /// Offset in radians of the first joint from [`LATER_NS`] on.
 const JUMP_RAD: f64 = 0.3;
 
-fn jump(input: &mut OwnedStepInput, _: &Rig) {
+fn jump(input: &mut OwnedStepInput, rig: &Rig) {
     if let Some(angles) = input.joint_angles.as_mut().filter(|_| input.stamp_ns >= LATER_NS) {
-        angles.angles_rad[0] += JUMP_RAD;
+        let names = rig.joint_names();
+        let undoes = Fault::new(FaultKind::JointOffset, &[-JUMP_RAD]).of_joints(&names[..1]);
+        correct_joint_angles(&[undoes.inverse()], &names, angles);
     }
 }
 
 fn assert_jump(found: &Diagnosis) {
-    assert_eq!((found.verdict, found.causes[0].cause), (DiagnosisVerdict::Cause, Cause::JointOffset), "{found}");
-    let [MeasurementCorrection::Offset(_, undone_rad)] = found.causes[0].changes.corrections.as_slice() else {
-        panic!("{found}")
-    };
+    assert_eq!((found.verdict, found.causes[0].cause), (DiagnosisVerdict::Cause, FaultKind::JointOffset), "{found}");
+    let [offset] = found.causes[0].changes.corrections.as_slice() else { panic!("{found}") };
+    let undone_rad = offset.value(0);
     assert!((undone_rad + JUMP_RAD).abs() < 0.02, "{undone_rad}");
     assert!((found.causes[0].from_s - 3.5).abs() < 0.21, "{found}");
 }
@@ -111,15 +112,15 @@ fn assert_jump(found: &Diagnosis) {
 #[test]
 fn an_offset_of_a_joint_is_named_with_its_time() {
     // The check is wrong here: its fault does not explain the residuals, so that all causes are tried.
-    let found = diagnosed(5.0, |_| (), jump, &[MeasuredFault::JointsReversed(vec!["pitch".to_owned()])]);
+    let found = diagnosed(5.0, |_| (), jump, &[Fault::from(FaultKind::JointReversed).of_joints(&["pitch".to_owned()])]);
     assert_jump(&found);
     assert!(!found.measured && found.headline().contains("by the trials"), "{found}");
 }
 
 #[test]
 fn a_fault_that_the_check_measures_is_undone_first() {
-    let offset = MeasuredFault::JointOffset { joint: "yaw".to_owned(), offset_rad: -0.27, since_s: Some(3.4) };
-    let found = diagnosed(5.0, |_| (), jump, &[offset]);
+    let offset = Fault::new(FaultKind::JointOffset, &[-0.27]).of_joints(&["yaw".to_owned()]);
+    let found = diagnosed(5.0, |_| (), jump, &[Fault { since_s: Some(3.4), ..offset }]);
     assert_jump(&found);
     assert!(found.measured && found.trials < 60, "{found}");
     assert!(found.headline().ends_with("by the check of the log and by the trials"), "{found}");
@@ -127,7 +128,7 @@ fn a_fault_that_the_check_measures_is_undone_first() {
 
 #[test]
 fn a_fault_that_no_change_undoes_ends_the_search() {
-    let found = diagnosed(5.0, |_| (), jump, &[MeasuredFault::Irreversible(FaultySource::Joints)]);
+    let found = diagnosed(5.0, |_| (), jump, &[Fault::from(FaultKind::UnusableJoints)]);
     assert_eq!((found.verdict, found.trials, found.causes.len()), (DiagnosisVerdict::LogFault, 0, 0), "{found}");
     assert!(found.headline().ends_with("by the check of the log"), "{found}");
 }

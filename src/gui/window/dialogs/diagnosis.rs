@@ -97,15 +97,16 @@ mod tests {
 
     use egui_kittest::kittest::Queryable as _;
 
+    use crate::faults::{Area, FaultKind, Severity};
     use crate::gui::Dialog;
     use crate::gui::window::tests::{SECOND_NS, bench, commands_of};
-    use crate::log_check::{Area, Finding, Severity};
-    use crate::session::{Cause, Command, Diagnosis, DiagnosisProgress, DiagnosisVerdict, ForkChanges, RankedCause};
+    use crate::log_check::Finding;
+    use crate::session::{Command, Diagnosis, DiagnosisProgress, DiagnosisVerdict, ForkChanges, RankedCause};
 
     fn diagnosis() -> Diagnosis {
         let changes: ForkChanges = "correct=reversed:yaw".parse().unwrap();
         let cause = RankedCause {
-            cause: Cause::JointReversed,
+            cause: FaultKind::JointReversed,
             statement: "joint yaw counts in the other direction".to_owned(),
             remedy: "reverse the sign of yaw in the recording".to_owned(),
             changes,

@@ -8,9 +8,9 @@ mod tests;
 use nalgebra::{Unit, UnitQuaternion, Vector3};
 
 use self::meanings::{changes, corrected, difference};
+use crate::faults::FaultKind;
 use crate::geometry::{ns_from_seconds, principal_angle, seconds_from_ns, so3};
 use crate::log_check::imu::ImuFacts;
-use crate::log_check::measured_fault::{FaultySource, MeasuredFault};
 use crate::log_check::report::{Area, Findings, ImageRotation, Measurement, Severity};
 use crate::log_check::statistics::median;
 use crate::log_check::survey::Survey;
@@ -131,7 +131,7 @@ pub(crate) fn check_source(
         let title = format!("gimbal.source is wrong; correct values: {changes}");
         let remedy = format!("set {changes} in gimbal.source");
         findings.add(Severity::Error, Area::Encoders, title, evidence, remedy);
-        findings.state_faults([MeasuredFault::Irreversible(FaultySource::Joints)]);
+        findings.state_faults([FaultKind::UnusableJoints.into()]);
     } else {
         findings.good(Area::Encoders, "gimbal.source predicts the rotations in the images", evidence);
     }
@@ -271,7 +271,7 @@ impl SourceFit<'_> {
         let remedy =
             "correct the driver: geometry_msgs/Quaternion maps the body to its reference, with the fields x, y, z, w";
         findings.add(Severity::Error, Area::Encoders, fault, evidence, remedy);
-        findings.state_faults([MeasuredFault::Irreversible(FaultySource::Joints)]);
+        findings.state_faults([FaultKind::UnusableJoints.into()]);
         true
     }
 

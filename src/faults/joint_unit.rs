@@ -7,7 +7,7 @@ const BITS: std::ops::RangeInclusive<u32> = 8..=20;
 
 /// Unit of joint angles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum JointUnit {
+pub enum JointUnit {
     Degrees,
     /// Degrees over this number.
     DegreeParts(u32),
@@ -19,14 +19,14 @@ pub(super) enum JointUnit {
 }
 
 impl JointUnit {
-    pub(super) fn all() -> impl Iterator<Item = Self> {
+    pub fn all() -> impl Iterator<Item = Self> {
         [Self::Degrees, Self::DegreeParts(10), Self::DegreeParts(100), Self::Milliradians, Self::ConvertedTwice]
             .into_iter()
             .chain(BITS.map(Self::Counts))
     }
 
     /// Size of the unit in radians.
-    pub(super) fn size_rad(self) -> f64 {
+    pub fn size_rad(self) -> f64 {
         match self {
             Self::Degrees => PI / 180.0,
             Self::DegreeParts(parts) => PI / 180.0 / f64::from(parts),
@@ -37,12 +37,12 @@ impl JointUnit {
     }
 
     /// Unit of this size.
-    pub(super) fn of_size(size_rad: f64) -> Option<Self> {
+    pub fn of_size(size_rad: f64) -> Option<Self> {
         Self::all().find(|unit| (unit.size_rad() / size_rad - 1.0).abs() < 1e-6)
     }
 
     /// State of angles in this unit.
-    pub(super) fn describe(self) -> String {
+    pub fn describe(self) -> String {
         match self {
             Self::Degrees => "in degrees".to_owned(),
             Self::DegreeParts(parts) => format!("in 1/{parts} of a degree"),

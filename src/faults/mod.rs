@@ -1,0 +1,22 @@
+//! Faults of measurements and rigs: one table of their kinds, their application to measurements and its inverse, their
+//! sentences, and the ranking of explanations.
+//!
+//! - `fault`: a fault with its values.
+//! - `table`: a row per kind.
+//! - `grammar`: the text of a fault in the changes of a fork.
+//! - `joint_unit`: units in which drivers report joint angles.
+//! - `sentence`: statement and remedy.
+//! - `apply`: correction of measurements by a fault; the inverse fault plants it.
+
+mod apply;
+mod fault;
+mod grammar;
+mod joint_unit;
+mod sentence;
+mod table;
+
+pub use apply::{JointMap, LensChange, correct_joint_angles, joint_maps};
+pub use fault::{Area, Choice, Fault, FaultKind, ImageFlip, ImageHalf, Sensor};
+pub use joint_unit::JointUnit;
+pub use sentence::{Sentence, Severity, Subject, USELESS_DELAY_S};
+pub use table::{Change, Correction, LONGEST_SHIFT_S, Parameter, Part, Row, TABLE};

@@ -1,0 +1,317 @@
+//! The table of faults: a row per kind.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use nalgebra::Vector3;
+
+use super::fault::{Area, Choice, Fault, FaultKind, ImageFlip, ImageHalf, Sensor};
+use crate::geometry::{SignedAxes, so3};
+use crate::text::Named;
+
+/// Definition of a kind of fault.
+#[derive(Debug)]
+pub struct Row {
+    pub kind: FaultKind,
+    /// Key in JSON.
+    pub key: &'static str,
+    pub sensor: Sensor,
+    /// Subject of the findings about it.
+    pub area: Area,
+    /// Text of the correction in the changes of a fork; `None` if no constant correction of measurements undoes the fault.
+    pub correction: Option<Correction>,
+    /// Parameters by the number of the value; the last one also describes further values.
+    pub parameters: &'static [Parameter],
+    /// Values from which a fit starts: the first value of the fault, the others are those without effect.
+    pub starts: &'static [f64],
+    /// Values with which a run is computed again before the best one is refined.
+    pub trials: &'static [f64],
+    /// Largest size that sound sensors and rigs have; `None` if any size is a fault.
+    pub noticeable: Option<f64>,
+    /// Kinds that contain this one as a special case.
+    pub general: &'static [FaultKind],
+}
+
+/// Text of a correction: `NAME:PART:PART`.
+#[derive(Debug)]
+pub struct Correction {
+    pub name: &'static str,
+    pub parts: &'static [Part],
+    /// Parts as messages show them.
+    pub example: &'static str,
+}
+
+/// Part of the text of a correction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// Number from 0.001 to 1000.
+    Factor,
+    /// Shift of a clock with its unit.
+    Shift,
+    /// Time of at most 60 s with its unit.
+    Duration,
+    /// Angle of at most 10 rad with its unit.
+    Angle,
+    Joint,
+    Flip,
+    Half,
+    Axes,
+}
+
+/// Parameter of a fault that is fitted.
+#[derive(Clone, Copy, Debug)]
+pub struct Parameter {
+    /// Step of a difference quotient, in the unit of the value.
+    pub step: f64,
+    /// Prior standard deviation of a change.
+    pub sigma: f64,
+    /// Largest change in one iteration.
+    pub largest: f64,
+    pub change: Change,
+}
+
+/// Composition of a value with its change.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Change {
+    /// The value is multiplied by `1 + change`.
+    Ratio,
+    Sum,
+    /// Rotation about the axis of the parameter's number, on the right of the rotation vector of the first three values.
+    Rotation,
+}
+
+/// Longest shift of a clock, in seconds: samples of that time around an image are at hand.
+pub const LONGEST_SHIFT_S: f64 = 0.05;
+
+/// Tried shifts of clocks in seconds, beside those that the columns of time offsets find.
+const SHIFTS_S: &[f64] = &[-0.04, -0.02, 0.02, 0.04];
+const DEGREE: f64 = PI / 180.0;
+
+const SCALE: Parameter = Parameter { step: 1e-3, sigma: 1.0, largest: 0.4, change: Change::Ratio };
+const FOCAL: Parameter = Parameter { step: 1e-2, ..SCALE };
+const CENTRE: Parameter = Parameter { step: 1e-2, sigma: 0.5, largest: 0.2, change: Change::Sum };
+const SHIFT: Parameter = Parameter { step: 2e-3, sigma: 0.2, largest: 0.05, change: Change::Sum };
+/// Readings are looked up at earlier times by a larger shift.
+const JOINT_SHIFT: Parameter = Parameter { step: -2e-3, ..SHIFT };
+const DRIFT: Parameter = Parameter { step: 1e-4, sigma: 0.01, largest: 0.005, change: Change::Sum };
+const OFFSET: Parameter = Parameter { step: 1e-3, sigma: 1.5, largest: 0.5, change: Change::Sum };
+const ROTATION: Parameter = Parameter { step: 1e-3, sigma: 1.0, largest: 0.5, change: Change::Rotation };
+
+/// All kinds of faults; messages list the corrections in this order.
+pub const TABLE: &[Row] = &[
+    Row::new(FaultKind::Focal, "focal_length", Sensor::Camera, Area::Intrinsics)
+        .corrected("focal", &[Part::Factor], "FACTOR")
+        .fitted(&[FOCAL], &[])
+        .tried(&[0.5, 0.6, 0.7, 0.78, 0.87, 0.95, 1.05, 1.15, 1.3, 1.5, 1.8])
+        .within(&[FaultKind::Intrinsics, FaultKind::FocalPieces]),
+    Row::new(FaultKind::Zoom, "zoom", Sensor::Camera, Area::Intrinsics)
+        .corrected("zoom", &[Part::Factor, Part::Duration], "FACTOR:1s")
+        .tried(&[0.6, 0.78, 1.28, 1.6]),
+    Row::new(FaultKind::ImageFlip, "image_flip", Sensor::Camera, Area::Images).corrected(
+        "image",
+        &[Part::Flip],
+        "mirrored|flipped|upside-down",
+    ),
+    Row::new(FaultKind::ImageRegion, "image_region", Sensor::Camera, Area::Images).corrected(
+        "ignored",
+        &[Part::Half],
+        "left|right|top|bottom",
+    ),
+    Row::new(FaultKind::CameraClock, "camera_clock", Sensor::Camera, Area::Time)
+        .corrected("camera-shift", &[Part::Shift], "15ms")
+        .fitted(&[SHIFT], &[])
+        .tried(SHIFTS_S)
+        .within(&[FaultKind::Clocks]),
+    Row::new(FaultKind::EncoderClock, "encoder_clock", Sensor::Joints, Area::Time)
+        .corrected("joint-shift", &[Part::Shift], "15ms")
+        .fitted(&[JOINT_SHIFT], &[0.1, 0.0, -0.1, -0.2, -0.35])
+        .noticeable(0.02)
+        .tried(SHIFTS_S)
+        .within(&[FaultKind::Clocks, FaultKind::EncoderNoise]),
+    Row::new(FaultKind::JointReversed, "joint_reversed", Sensor::Joints, Area::Encoders)
+        .corrected("reversed", &[Part::Joint], "JOINT")
+        .fitted(&[OFFSET], &[])
+        .within(&[FaultKind::EncoderNoise]),
+    Row::new(FaultKind::JointsSwapped, "joints_swapped", Sensor::Joints, Area::Encoders)
+        .corrected("swapped", &[Part::Joint, Part::Joint], "JOINT:JOINT")
+        .within(&[FaultKind::EncoderNoise]),
+    Row::new(FaultKind::JointOffset, "joint_offset", Sensor::Joints, Area::Encoders)
+        .corrected("offset", &[Part::Joint, Part::Angle], "JOINT:20deg")
+        .fitted(&[OFFSET], &[0.0, 0.6, -0.6, FRAC_PI_2, -FRAC_PI_2])
+        .noticeable(0.026)
+        .within(&[FaultKind::EncoderNoise, FaultKind::Chain]),
+    Row::new(FaultKind::JointScale, "joint_scale", Sensor::Joints, Area::Encoders)
+        .corrected("joint-scale", &[Part::Factor], "FACTOR")
+        .fitted(&[SCALE], &[1.0])
+        .noticeable(0.03)
+        .tried(&[DEGREE, 1.0 / DEGREE])
+        .within(&[FaultKind::EncoderNoise]),
+    Row::new(FaultKind::ImuAxes, "imu_axes", Sensor::Imu, Area::Imu).corrected("imu-axes", &[Part::Axes], "y/x/-z"),
+    Row::new(FaultKind::GyroscopeAxes, "gyroscope_axes", Sensor::Imu, Area::Imu).corrected(
+        "gyroscope-axes",
+        &[Part::Axes],
+        "…",
+    ),
+    Row::new(FaultKind::AccelerometerAxes, "accelerometer_axes", Sensor::Imu, Area::Imu).corrected(
+        "accelerometer-axes",
+        &[Part::Axes],
+        "…",
+    ),
+    // Wrong units and ranges: degrees and radians, g and m/s², half and double the range.
+    Row::new(FaultKind::GyroscopeScale, "gyroscope_scale", Sensor::Imu, Area::Imu)
+        .corrected("gyroscope-scale", &[Part::Factor], "FACTOR")
+        .fitted(&[SCALE], &[1.0, 2.0, 0.5, DEGREE])
+        .noticeable(0.03)
+        .tried(&[DEGREE, 1.0 / DEGREE, 2.0, 0.5]),
+    Row::new(FaultKind::AccelerometerScale, "accelerometer_scale", Sensor::Imu, Area::Imu)
+        .corrected("accelerometer-scale", &[Part::Factor], "FACTOR")
+        .tried(&[9.806_65, 1.0 / 9.806_65, 2.0, 0.5]),
+    Row::new(FaultKind::Clocks, "clocks", Sensor::Camera, Area::Time),
+    Row::new(FaultKind::Shutter, "shutter", Sensor::Camera, Area::Time),
+    Row::new(FaultKind::PrincipalPoint, "principal_point", Sensor::Camera, Area::Intrinsics)
+        .fitted(&[CENTRE], &[0.0])
+        .within(&[FaultKind::Intrinsics]),
+    Row::new(FaultKind::Intrinsics, "intrinsics", Sensor::Camera, Area::Intrinsics).fitted(&[FOCAL, CENTRE], &[]),
+    Row::new(FaultKind::FocalPieces, "focal_pieces", Sensor::Camera, Area::Intrinsics),
+    Row::new(FaultKind::CameraDrift, "camera_drift", Sensor::Camera, Area::Time)
+        .fitted(&[SHIFT, DRIFT], &[0.0])
+        .noticeable(2e-4),
+    Row::new(FaultKind::Mount, "mount", Sensor::Camera, Area::Extrinsics).fitted(&[ROTATION], &[0.0]).noticeable(0.026),
+    Row::new(FaultKind::Chain, "extrinsics", Sensor::Camera, Area::Extrinsics).within(&[FaultKind::EncoderNoise]),
+    Row::new(FaultKind::ImuIntrinsics, "imu_intrinsics", Sensor::Imu, Area::Imu),
+    Row::new(FaultKind::ImuNoise, "imu_noise", Sensor::Imu, Area::Imu).tried(NOISE_FACTORS),
+    Row::new(FaultKind::EncoderNoise, "encoder_noise", Sensor::Joints, Area::Encoders).tried(NOISE_FACTORS),
+    Row::new(FaultKind::UnusableImu, "unusable_imu", Sensor::Imu, Area::Imu),
+    Row::new(FaultKind::UnusableJoints, "unusable_joints", Sensor::Joints, Area::Encoders),
+];
+
+const NOISE_FACTORS: &[f64] = &[3.0, 10.0, 30.0];
+
+impl Row {
+    const fn new(kind: FaultKind, key: &'static str, sensor: Sensor, area: Area) -> Self {
+        Self {
+            kind,
+            key,
+            sensor,
+            area,
+            correction: None,
+            parameters: &[],
+            starts: &[],
+            trials: &[],
+            noticeable: None,
+            general: &[],
+        }
+    }
+
+    const fn corrected(self, name: &'static str, parts: &'static [Part], example: &'static str) -> Self {
+        Self { correction: Some(Correction { name, parts, example }), ..self }
+    }
+
+    const fn fitted(self, parameters: &'static [Parameter], starts: &'static [f64]) -> Self {
+        Self { parameters, starts, ..self }
+    }
+
+    const fn noticeable(self, size: f64) -> Self {
+        Self { noticeable: Some(size), ..self }
+    }
+
+    const fn tried(self, trials: &'static [f64]) -> Self {
+        Self { trials, ..self }
+    }
+
+    const fn within(self, general: &'static [FaultKind]) -> Self {
+        Self { general, ..self }
+    }
+
+    /// Composition of a value with its change; a value that is not fitted is a factor or, in a shift, an addition.
+    pub(super) fn change(&self, number: usize) -> Change {
+        let parameter = self.parameters.get(number).or(self.parameters.last());
+        parameter.map_or(Change::Ratio, |parameter| parameter.change)
+    }
+}
+
+impl Change {
+    /// Value without effect.
+    pub(super) fn neutral(self) -> f64 {
+        if self == Self::Ratio { 1.0 } else { 0.0 }
+    }
+}
+
+impl FaultKind {
+    pub fn row(self) -> &'static Row {
+        TABLE.iter().find(|row| row.kind == self).expect("the table has a row of each kind")
+    }
+
+    /// True if this kind has the other one as a special case.
+    pub fn contains(self, other: Self) -> bool {
+        other.row().general.contains(&self)
+    }
+
+    /// Faults of this kind with the values of its row, for each of the joints or pairs of them.
+    pub fn trials(self, joints: &[String]) -> Vec<Fault> {
+        let row = self.row();
+        let chosen = |choice: Choice| Fault { choice: Some(choice), ..self.into() };
+        match row.correction.as_ref().map_or(&[][..], |correction| correction.parts) {
+            [Part::Joint] => joints.iter().map(|joint| Fault::from(self).of_joints([joint])).collect(),
+            [Part::Joint, Part::Joint] => {
+                let pairs =
+                    (0..joints.len()).flat_map(|first| (first + 1..joints.len()).map(move |second| (first, second)));
+                pairs.map(|(first, second)| Fault::from(self).of_joints([&joints[first], &joints[second]])).collect()
+            }
+            [Part::Flip] => ImageFlip::all().map(|flip| chosen(Choice::Flip(flip))).collect(),
+            [Part::Half] => ImageHalf::all().map(|half| chosen(Choice::Half(half))).collect(),
+            _ => row.trials.iter().map(|value| Fault::new(self, &[*value])).collect(),
+        }
+    }
+}
+
+impl Fault {
+    /// Parameter of the value with a number; `None` if it is not fitted.
+    pub fn parameter(&self, number: usize) -> Option<&'static Parameter> {
+        let parameters = self.kind.row().parameters;
+        parameters.get(number).or(parameters.last())
+    }
+
+    /// Changes the value with a number, as its parameter says.
+    pub fn change(&mut self, number: usize, change: f64) {
+        match self.kind.row().change(number) {
+            Change::Ratio => self.values[number] *= 1.0 + change,
+            Change::Sum => self.values[number] += change,
+            Change::Rotation => {
+                let rotation = self.mount() * so3::exp(&Vector3::ith(number, change));
+                self.values = so3::log(&rotation).iter().copied().collect();
+            }
+        }
+    }
+
+    /// Faults of a kind from which a fit of some values starts, for a joint or several.
+    pub fn starts(kind: FaultKind, joints: &[&String], values: usize) -> Vec<Self> {
+        let row = kind.row();
+        let start = |first: &f64| {
+            let others = (1..values).map(|number| row.change(number).neutral());
+            let values: Vec<f64> = std::iter::once(*first).chain(others).collect();
+            Self::new(kind, &values).of_joints(joints.iter().copied())
+        };
+        row.starts.iter().map(start).collect()
+    }
+
+    /// Left-handed frame of a gyroscope: its rotations are reversed.
+    pub fn left_handed() -> Self {
+        let identity = SignedAxes::all().next().expect("the identity is the first one");
+        Self::of_axes(FaultKind::GyroscopeAxes, identity.negated())
+    }
+}
+
+/// Names of the kinds in JSON.
+impl Named for FaultKind {
+    const NAMES: &'static [(Self, &'static str)] = &names();
+}
+
+const fn names() -> [(FaultKind, &'static str); TABLE.len()] {
+    let mut names = [(FaultKind::Focal, ""); TABLE.len()];
+    let mut number = 0;
+    while number < TABLE.len() {
+        names[number] = (TABLE[number].kind, TABLE[number].key);
+        number += 1;
+    }
+    names
+}
