@@ -6,17 +6,20 @@
 //! - `grammar`: the text of a fault in the changes of a fork.
 //! - `joint_unit`: units in which drivers report joint angles.
 //! - `sentence`: statement and remedy.
+//! - `ranking`: criterion of explanations, and those that remain.
 //! - `apply`: correction of measurements by a fault; the inverse fault plants it.
 
 mod apply;
 mod fault;
 mod grammar;
 mod joint_unit;
+mod ranking;
 mod sentence;
 mod table;
 
 pub use apply::{JointMap, LensChange, correct_joint_angles, joint_maps};
 pub use fault::{Area, Choice, Fault, FaultKind, ImageFlip, ImageHalf, Sensor};
 pub use joint_unit::JointUnit;
+pub use ranking::{Explanation, MOST_REMAINING, criterion};
 pub use sentence::{Sentence, Severity, Subject, USELESS_DELAY_S};
 pub use table::{Change, Correction, LONGEST_SHIFT_S, Parameter, Part, Row, TABLE};

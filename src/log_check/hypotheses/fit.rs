@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 
 use super::super::statistics::median;
-use crate::faults::{Fault, FaultKind, LensChange};
+use crate::faults::{Explanation, Fault, FaultKind, LensChange};
 use crate::gimbal::ClassicalChain;
 use crate::log_check::rotations::data::{JOINED_S, MeasuredRotation, RotationData, joined};
 use crate::log_check::rotations::fit::{
@@ -70,6 +70,16 @@ pub(in crate::log_check) struct Fitted {
     pub(super) fit: RotationFit,
     /// Deviance plus the logarithm of the number of measurements per parameter.
     pub(super) criterion: f64,
+}
+
+impl Explanation for Fitted {
+    fn criterion(&self) -> f64 {
+        self.criterion
+    }
+
+    fn contains(&self, other: &Self) -> bool {
+        self.fault.contains(&other.fault)
+    }
 }
 
 impl Fitted {
@@ -161,7 +171,7 @@ impl<'a> Fitter<'a> {
         let mut tried: Vec<(f64, Fault)> = starts.filter_map(tried).collect();
         tried.sort_by(|a, b| a.0.total_cmp(&b.0));
         let fits = tried.into_iter().take(FOLLOWED).filter_map(|(_, start)| self.converged(start, fitted, &priors));
-        fits.min_by(|a, b| a.criterion.total_cmp(&b.criterion))
+        fits.min_by(|one, other| one.criterion.total_cmp(&other.criterion))
     }
 
     /// Iterates corrections of the data and linear fits until the values no longer change.

@@ -17,15 +17,13 @@ use self::focal_grid::FocalGrid;
 use super::report::{Area, Findings, Severity};
 use super::rotations::data::RotationData;
 use super::rotations::fit::RotationFit;
-use crate::faults::{Fault, FaultKind, Sentence, Subject};
+use crate::faults::{Explanation as _, Fault, FaultKind, MOST_REMAINING, Sentence, Subject};
 use crate::geometry::SignedAxes;
 use crate::gimbal::ClassicalChain;
 use crate::sensors::CameraMount;
 
 /// Difference of the criterion by which a hypothesis must be better than another to exclude it: odds of e⁻¹⁰.
 const DECISIVE: f64 = 20.0;
-/// Largest number of causes that are listed.
-const LISTED: usize = 3;
 /// The same for a cause of rotations that noise explains: many are tried, at many times.
 const DECISIVE_WITHIN_NOISE: f64 = 40.0;
 /// A cause must leave at most this ratio of the misfit to be listed.
@@ -43,7 +41,7 @@ pub(super) struct NamedCause {
 }
 
 /// Result of a comparison of all hypotheses.
-pub(super) enum Explanation {
+pub(super) enum Outcome {
     /// One cause explains the misfit, and no other does.
     Decisive(NamedCause, String),
     /// Causes that remain, best first, each with what it leaves; may be empty.
@@ -62,9 +60,9 @@ pub(super) struct WithinNoise {
 
 /// Searches for the cause of a misfit between the rotations of a camera and their prediction by a chain. An orientation
 /// that differs from the rig's by more than the tolerance counts as a fault.
-pub(super) fn explain(data: &RotationData<'_>, chain: &ClassicalChain, orientation_tolerance_rad: f64) -> Explanation {
+pub(super) fn explain(data: &RotationData<'_>, chain: &ClassicalChain, orientation_tolerance_rad: f64) -> Outcome {
     let Some(mut comparison) = Comparison::new(data, chain, orientation_tolerance_rad) else {
-        return Explanation::Open(Vec::new());
+        return Outcome::Open(Vec::new());
     };
     comparison.add_intrinsics();
     comparison.explanation()
@@ -94,7 +92,7 @@ pub(super) fn explain_within_noise(
     let mut listed: Vec<&Fitted> = Vec::new();
     for found in comparison.fitted.iter().filter(instead) {
         // A movement of the mount can always replace a jump of the last joint.
-        if listed.len() + 1 < LISTED && !listed.iter().any(|special| found.fault.contains(&special.fault)) {
+        if listed.len() + 1 < MOST_REMAINING && !listed.iter().any(|special| found.fault.contains(&special.fault)) {
             listed.push(found);
         }
     }
@@ -147,17 +145,13 @@ impl<'a> Comparison<'a> {
         let given = fitter.fit_given()?;
         let mut comparison = Self { data, fitter, given, fitted: Vec::new() };
         comparison.add(candidates(data, chain));
-        comparison.sort();
+        Fitted::sort(&mut comparison.fitted);
         Some(comparison)
     }
 
     fn add(&mut self, hypotheses: Vec<Hypothesis>) {
         let fitted: Vec<Fitted> = hypotheses.into_par_iter().filter_map(|one| self.fitter.best(one)).collect();
         self.fitted.extend(fitted);
-    }
-
-    fn sort(&mut self) {
-        self.fitted.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
     }
 
     /// Criterion without a correction.
@@ -180,7 +174,7 @@ impl<'a> Comparison<'a> {
         let grid = FocalGrid::new(&self.fitter);
         self.add(intrinsics(grid.best_constant()));
         self.fitted.extend(grid.pieces_fit(&self.fitter));
-        self.sort();
+        Fitted::sort(&mut self.fitted);
     }
 
     /// Cause in words, with what it leaves.
@@ -200,25 +194,14 @@ impl<'a> Comparison<'a> {
         (cause(self.data, found), evidence)
     }
 
-    fn explanation(&self) -> Explanation {
+    fn explanation(&self) -> Outcome {
         let (fitted, given) = (&self.fitted, &self.given);
-        // Of two that explain the misfit, a special case is preferred unless it is decisively worse.
-        let simpler = |best: &Fitted| {
-            fitted.iter().find(|it| {
-                best.fault.contains(&it.fault)
-                    && !it.fault.is_alike(&best.fault)
-                    && it.fit.is_explained()
-                    && it.criterion < best.criterion + DECISIVE
-            })
-        };
-        let Some(best) = fitted.first().map(|best| simpler(best).unwrap_or(best)) else {
-            return Explanation::Open(Vec::new());
-        };
-        let rival = fitted.iter().find(|other| !other.fault.contains(&best.fault));
-        let is_alone = rival.is_none_or(|rival| rival.criterion > best.criterion + DECISIVE);
+        let preferred = Fitted::preferred(fitted, DECISIVE, |it| it.fit.is_explained());
+        let Some(best) = fitted.get(preferred) else { return Outcome::Open(Vec::new()) };
+        let is_alone = best.rivals(fitted, DECISIVE).next().is_none();
         if best.fit.is_explained() && is_alone && best.criterion + DECISIVE < self.criterion_given() {
             let (cause, evidence) = self.describe(best);
-            return Explanation::Decisive(cause, evidence);
+            return Outcome::Decisive(cause, evidence);
         }
         let mut open: Vec<(NamedCause, String)> = Vec::new();
         for found in fitted {
@@ -229,13 +212,13 @@ impl<'a> Comparison<'a> {
             let (cause, evidence) = self.describe(found);
             if remains
                 && improves
-                && open.len() < LISTED
+                && open.len() < MOST_REMAINING
                 && open.iter().all(|(listed, _)| listed.sentence.statement != cause.sentence.statement)
             {
                 open.push((cause, evidence));
             }
         }
-        Explanation::Open(open)
+        Outcome::Open(open)
     }
 }
 
@@ -247,7 +230,7 @@ impl NamedCause {
     }
 }
 
-impl Explanation {
+impl Outcome {
     /// True if the cause, or the first of those that remain, is in this area.
     pub(super) fn is_of(&self, area: Area) -> bool {
         match self {

@@ -22,7 +22,7 @@ use super::log_faults::LogFaults;
 use super::measured::Undoing;
 use super::misfit::Misfit;
 use super::outcome::{Diagnosis, DiagnosisVerdict, RankedCause, TruthAgreement, WaitingReason};
-use super::ranking::{RankedTrial, RankingDecision, best, by_cause, decide};
+use super::ranking::{RankedTrial, RankingDecision, by_cause, decide};
 use super::refinement::refined;
 use super::scoring::{LOST, Trials, scored};
 use super::span::{confirmed_span, screened_span};
@@ -30,7 +30,7 @@ use super::statement::texts;
 use super::trial::{DiagnosedRun, TrialResult, TrialSpan};
 use super::truth;
 use super::tuning::{moved, tuned};
-use crate::faults::FaultKind;
+use crate::faults::{Explanation as _, FaultKind};
 use crate::geometry::seconds_from_ns;
 use crate::log_check::Finding;
 use crate::sensors::Rig;
@@ -136,7 +136,7 @@ impl Search<'_, '_> {
         if let Some(span) = span.filter(|_| !undoing.hypotheses.is_empty())
             && let Some((span, trials)) = self.best_of(&span, given, undoing.hypotheses)
         {
-            let best = best(&trials.others);
+            let best = RankedTrial::best(&trials.others);
             if best.is_some_and(|best| agreement::disagreement(&best.misfit) <= 1.0) {
                 self.conclude(diagnosis, &span, trials);
                 diagnosis.measured = diagnosis.explaining > 0;
@@ -182,7 +182,7 @@ impl Search<'_, '_> {
             .map(|candidate| candidate.hypothesis)
             .collect();
         let mut next = refined(self.run, &first.others);
-        let best = best(&first.others);
+        let best = RankedTrial::best(&first.others);
         let bound = |given: &TrialResult| CostBound::of_best(&given.steps, &best?.result.steps);
         let mut confirmed: Option<Trials> = None;
         for round in 0..ROUNDS {

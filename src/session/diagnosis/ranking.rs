@@ -8,7 +8,7 @@ use super::agreement::disagreement;
 use super::hypotheses::TrialHypothesis;
 use super::misfit::{Misfit, Scale};
 use super::trial::TrialResult;
-use crate::faults::{Choice, Fault, FaultKind};
+use crate::faults::{Choice, Explanation, Fault, FaultKind, MOST_REMAINING, criterion};
 
 /// Trial of a hypothesis with its averages over the scored steps.
 #[derive(Clone, Debug)]
@@ -20,6 +20,17 @@ pub(super) struct RankedTrial {
     pub(super) score: f64,
 }
 
+impl Explanation for RankedTrial {
+    fn criterion(&self) -> f64 {
+        self.score
+    }
+
+    fn contains(&self, other: &Self) -> bool {
+        let (cause, special) = (self.hypothesis.cause, other.hypothesis.cause);
+        cause == special || cause.contains(special)
+    }
+}
+
 /// Smallest advantage of a cause over the next one, in units of −2·ln of a likelihood, and relative to the gain of the
 /// best cause: residuals of neighbouring images are not independent, so that a formal advantage is not enough.
 const MARGIN: f64 = 30.0;
@@ -28,8 +39,6 @@ const MARGIN_RATIO: f64 = 0.05;
 const REMAINING: f64 = 0.4;
 /// Smallest gain of images without a half of them, relative to the score of the run: halves of sound images differ, too.
 const REGION_RATIO: f64 = 0.2;
-/// Largest number of causes that remain.
-const MOST_REMAINING: usize = 3;
 
 /// Conclusion from the ranked causes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,12 +63,7 @@ pub(super) fn score(hypothesis: &TrialHypothesis, misfit: &Misfit, given: &Misfi
     }
     let rows = |factor: usize| misfit.factors[factor].rows * scale.frames / misfit.frames.max(1) as f64;
     let noise = rows(0) * hypothesis.changes.imu_noise.ln() + rows(1) * hypothesis.changes.encoder_noise.ln();
-    cost + 2.0 * scale.windows * noise + hypothesis.parameters as f64 * observations.ln()
-}
-
-/// Trial with the lowest score, `None` without trials.
-pub(super) fn best<'a>(trials: impl IntoIterator<Item = &'a RankedTrial>) -> Option<&'a RankedTrial> {
-    trials.into_iter().min_by(|one, other| one.score.total_cmp(&other.score))
+    criterion(cost + 2.0 * scale.windows * noise, hypothesis.parameters as f64, observations)
 }
 
 /// The best candidate of each cause, the best cause first; a special case that is about as good precedes the general
@@ -69,19 +73,16 @@ pub(super) fn by_cause(given: &RankedTrial, mut candidates: Vec<RankedTrial>) ->
         it.hypothesis.cause == FaultKind::ImageRegion && given.score - it.score < REGION_RATIO * given.score
     };
     candidates.retain(|candidate| !is_slight(candidate));
-    candidates.sort_by(|one, other| one.score.total_cmp(&other.score));
+    RankedTrial::sort(&mut candidates);
     let mut kept: Vec<RankedTrial> = Vec::new();
     for candidate in candidates {
         if kept.iter().all(|known| known.hypothesis.cause != candidate.hypothesis.cause) {
             kept.push(candidate);
         }
     }
-    if let Some((best, score)) = kept.first().map(|best| (best.hypothesis.cause, best.score)) {
-        let margin = margin(given.score - score);
-        let special = kept.iter().position(|it| best.contains(it.hypothesis.cause) && it.score < score + margin);
-        if let Some(special) = special {
-            kept[..=special].rotate_right(1);
-        }
+    if let Some(best) = kept.first() {
+        let preferred = RankedTrial::preferred(&kept, margin(given.score - best.score), |_| true);
+        kept[..=preferred].rotate_right(1);
     }
     kept
 }
@@ -101,10 +102,9 @@ pub(super) fn decide(given: &RankedTrial, ranked: &[RankedTrial]) -> RankingDeci
     }
     // A cause that leaves a disagreement does not compete with one that leaves none.
     let as_good = |it: &&RankedTrial| after > 1.0 || disagreement(&it.misfit) <= 1.0;
-    let near = ranked.iter().filter(|candidate| candidate.score < best.score + margin(gain)).filter(as_good);
-    match near.filter(|candidate| !candidate.hypothesis.cause.contains(best.hypothesis.cause)).count() {
-        0 | 1 => RankingDecision::One,
-        count => RankingDecision::Several(count.min(MOST_REMAINING)),
+    match best.rivals(ranked, margin(gain)).filter(as_good).count() {
+        0 => RankingDecision::One,
+        rivals => RankingDecision::Several((rivals + 1).min(MOST_REMAINING)),
     }
 }
 

@@ -1,11 +1,11 @@
 //! Values of causes from the trials so far: better hypotheses of the same kinds.
 
 use super::hypotheses::TrialHypothesis;
-use super::ranking::{RankedTrial, best};
+use super::ranking::RankedTrial;
 use super::trial::{DiagnosedRun, TrialResult};
 use super::tuning::rounded;
 use crate::estimator::SensorParameters;
-use crate::faults::{Fault, FaultKind, LONGEST_SHIFT_S};
+use crate::faults::{Explanation as _, Fault, FaultKind, LONGEST_SHIFT_S};
 use crate::gimbal::{ParameterId, ParameterPart, Quantity};
 use crate::session::plan::ForkChanges;
 
@@ -33,7 +33,7 @@ pub(super) fn refined(run: &DiagnosedRun<'_>, candidates: &[RankedTrial]) -> Vec
     }
     let best_of = |cause: FaultKind| {
         let of_cause = candidates.iter().filter(|it| it.hypothesis.cause == cause && it.hypothesis.from.is_none());
-        best(of_cause)
+        RankedTrial::best(of_cause)
     };
     if let Some(best) = best_of(FaultKind::Focal).filter(|_| run.spec.calibrate && !run.spec.intrinsics) {
         // The columns of the intrinsics find the rest of the error from here; the result is refined once more.

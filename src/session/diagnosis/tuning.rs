@@ -1,9 +1,9 @@
 //! Values and steps around those of the best trials.
 
 use super::hypotheses::TrialHypothesis;
-use super::ranking::{RankedTrial, best};
+use super::ranking::RankedTrial;
 use super::scoring::Trials;
-use crate::faults::{Fault, FaultKind};
+use crate::faults::{Explanation as _, Fault, FaultKind};
 
 /// Steps around that of the best change which are tried.
 const MOVES: [isize; 8] = [-16, -8, -4, -2, -1, 1, 2, 4];
@@ -13,7 +13,7 @@ const SPREADS: [[f64; 2]; 2] = [[0.94, 1.06], [0.6, 1.6]];
 /// The best change that begins at a step, at other steps around it.
 pub(super) fn moved(trials: &Trials) -> Vec<TrialHypothesis> {
     let later = trials.others.iter().filter(|it| it.hypothesis.from.is_some());
-    let Some(best) = best(later) else { return Vec::new() };
+    let Some(best) = RankedTrial::best(later) else { return Vec::new() };
     let hypothesis = &best.hypothesis;
     let steps = MOVES.map(|by| hypothesis.from.and_then(|from| from.checked_add_signed(by)));
     steps.into_iter().flatten().map(|step| TrialHypothesis { from: Some(step), ..hypothesis.clone() }).collect()
@@ -23,7 +23,9 @@ pub(super) fn moved(trials: &Trials) -> Vec<TrialHypothesis> {
 pub(super) fn tuned(candidates: &[RankedTrial]) -> Vec<TrialHypothesis> {
     let mut all = Vec::new();
     for cause in [FaultKind::JointOffset, FaultKind::Zoom] {
-        let Some(best) = best(candidates.iter().filter(|it| it.hypothesis.cause == cause)) else { continue };
+        let Some(best) = RankedTrial::best(candidates.iter().filter(|it| it.hypothesis.cause == cause)) else {
+            continue;
+        };
         let hypothesis = &best.hypothesis;
         let [fault] = hypothesis.changes.corrections.as_slice() else { continue };
         for (number, (value, spread)) in fault.values.iter().zip(&SPREADS).enumerate() {
