@@ -289,14 +289,8 @@ impl Subject<'_> {
                         .to_owned(),
                 )
             }
-            FaultKind::GyroscopeAxes => (
-                format!("the axes of the gyroscope differ from the accelerometer's: x/y/z are {text} of the recording"),
-                "correct the axes of the angular velocities in the driver or the converter".to_owned(),
-            ),
-            FaultKind::AccelerometerAxes => (
-                format!("the axes of the accelerometer differ from the gyroscope's: x/y/z are {text} of the recording"),
-                "correct the axes of the specific forces in the driver or the converter".to_owned(),
-            ),
+            FaultKind::GyroscopeAxes => axes_texts(["gyroscope", "accelerometer"], &text, "angular velocities"),
+            FaultKind::AccelerometerAxes => axes_texts(["accelerometer", "gyroscope"], &text, "specific forces"),
             FaultKind::GyroscopeScale => (
                 scale_text("angular velocities", factor, PI / 180.0, "degrees per second"),
                 "record rad/s; check the range setting of the gyroscope".to_owned(),
@@ -422,6 +416,14 @@ fn clock_texts(measurements: &str, field: &str, given_s: f64, shift_s: f64) -> (
     (
         format!("the stamps of {measurements} are {:.1} ms {side} than the rig says", 1e3 * shift_s.abs()),
         format!("set {field}: {:.4} in the rig, or run with timeshift=on", given_s + shift_s),
+    )
+}
+
+/// Texts of wrong axes of a sensor alone, not of the other one.
+fn axes_texts([sensor, other]: [&str; 2], axes: &str, measurements: &str) -> (String, String) {
+    (
+        format!("the axes of the {sensor} differ from the {other}'s: x/y/z are {axes} of the recording"),
+        format!("correct the axes of the {measurements} in the driver or the converter"),
     )
 }
 

@@ -11,7 +11,7 @@ use crate::session::plan::ForkChanges;
 use crate::text::Named as _;
 
 /// Conclusion of a diagnosis.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DiagnosisVerdict {
     /// The residuals agree with their noise: no cause is looked for.
@@ -25,6 +25,7 @@ pub enum DiagnosisVerdict {
     /// No tried cause explains the residuals.
     Unexplained,
     /// No image reached the estimator.
+    #[default]
     NoSteps,
 }
 
@@ -79,7 +80,7 @@ pub struct WaitingReason {
 }
 
 /// Agreement of a run with its noise, and the causes of a disagreement, best first.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Diagnosis {
     /// File name of the log.
     pub log: String,
@@ -169,23 +170,7 @@ impl fmt::Display for Diagnosis {
 impl Diagnosis {
     /// Diagnosis of a run of which nothing is known yet.
     pub(in crate::session) fn before_trials(run: String) -> Self {
-        Self {
-            log: String::new(),
-            run,
-            verdict: DiagnosisVerdict::NoSteps,
-            log_faults: Vec::new(),
-            measured: false,
-            values: Vec::new(),
-            onset_s: None,
-            waiting: Vec::new(),
-            accuracy: None,
-            ground_truth: None,
-            span_s: None,
-            explaining: 0,
-            causes: Vec::new(),
-            trials: 0,
-            interrupted: false,
-        }
+        Self { run, ..Self::default() }
     }
 
     /// The finding in one sentence: a fault that the check of the log measures precedes what the trials explain.
