@@ -2,8 +2,8 @@
 
 use nalgebra::{Vector2, Vector3};
 
-use super::fault::{Choice, Fault, FaultKind, ImageFlip, Sensor};
-use super::table::Change;
+use super::fault::{Choice, Fault, ImageFlip};
+use super::table::{Change, FaultKind, Sensor};
 use crate::camera::CameraModel;
 use crate::sensors::{ImuSample, JointAngles};
 

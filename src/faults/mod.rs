@@ -18,8 +18,8 @@ mod sentence;
 mod table;
 
 pub use apply::{JointMap, LensChange, correct_joint_angles, joint_maps};
-pub use fault::{Area, Choice, Fault, FaultKind, ImageFlip, ImageHalf, Sensor};
+pub use fault::{Choice, Fault, ImageFlip, ImageHalf};
 pub use joint_unit::JointUnit;
 pub use ranking::{Explanation, MOST_REMAINING, criterion};
 pub use sentence::{Sentence, Severity, Subject, USELESS_DELAY_S};
-pub use table::{Change, Correction, LONGEST_SHIFT_S, Parameter, Part, Row, TABLE};
+pub use table::{Area, Change, Correction, FaultKind, LONGEST_SHIFT_S, Parameter, Part, Row, Sensor, TABLE};

@@ -6,8 +6,9 @@ use std::f64::consts::PI;
 use serde::Serialize;
 
 use super::apply::joint_maps;
-use super::fault::{Choice, Fault, FaultKind};
+use super::fault::{Choice, Fault};
 use super::joint_unit::JointUnit;
+use super::table::FaultKind;
 use crate::geometry::SignedAxes;
 use crate::sensors::{CameraRig, Rig};
 use crate::text::Named as _;

@@ -2,11 +2,98 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use nalgebra::Vector3;
+use serde::Serialize;
 
-use super::fault::{Area, Choice, Fault, FaultKind, ImageFlip, ImageHalf, Sensor};
-use crate::geometry::{SignedAxes, so3};
 use crate::text::Named;
+
+/// Kind of a fault; its row is in [`TABLE`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum FaultKind {
+    /// Values: factor on the focal lengths.
+    Focal,
+    /// Values: factor by which the focal lengths change, and the seconds over which they do.
+    Zoom,
+    /// Images are mirrored or upside down.
+    ImageFlip,
+    /// A part of the images contradicts the rest.
+    ImageRegion,
+    /// Values: seconds to add to `timeshift_cam_imu`.
+    CameraClock,
+    /// Values: seconds to add to `timeshift_gimbal_imu`.
+    EncoderClock,
+    /// Joints that count in the other direction. Values: angles to add to the reversed readings, in radians; zero without.
+    JointReversed,
+    /// Pairs of joints whose readings are exchanged, one pair after the other.
+    JointsSwapped,
+    /// Values: angle to add to the readings of a joint, in radians.
+    JointOffset,
+    /// Values: factor on the readings of a joint, or of all joints.
+    JointScale,
+    /// Axes of gyroscope and accelerometer.
+    ImuAxes,
+    GyroscopeAxes,
+    AccelerometerAxes,
+    /// Values: factor on the angular velocities.
+    GyroscopeScale,
+    /// Values: factor on the specific forces.
+    AccelerometerScale,
+    /// Time offsets of cameras and encoders.
+    Clocks,
+    /// Rolling shutter. Values: readout in seconds and its standard deviation.
+    Shutter,
+    /// Values: offset of the principal point in units of the focal length.
+    PrincipalPoint,
+    /// Values: factor on the focal lengths, then as for the principal point.
+    Intrinsics,
+    /// Values: time in seconds and ratio to the rig's focal length of each piece with a constant one.
+    FocalPieces,
+    /// Values: seconds to add to `timeshift_cam_imu`, and their change per second since the log began.
+    CameraDrift,
+    /// The mount of the camera moves. Values: rotation vector against the rig's orientation, camera frame, in radians.
+    Mount,
+    /// Pose of a rigid camera, or the chain of the gimbal. Values: distance in metres and angle in radians.
+    Chain,
+    ImuIntrinsics,
+    /// Values: factor on the noise densities.
+    ImuNoise,
+    /// Values: factor on the standard deviation of the joint angles.
+    EncoderNoise,
+    /// Samples of the IMU that no constant correction restores.
+    UnusableImu,
+    /// Joint angles that no constant correction restores.
+    UnusableJoints,
+}
+
+/// Sensor with the faulty measurements.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sensor {
+    Imu,
+    Joints,
+    Camera,
+}
+
+/// Subject of a finding.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Area {
+    /// The file and its topics.
+    Log,
+    /// Time bases, rates, gaps and order of stamps.
+    Time,
+    /// Units, gravity, biases, noise and saturation of the IMU.
+    #[serde(rename = "inertial")]
+    Imu,
+    /// Stationary and hovering periods, fast rotation.
+    Motion,
+    /// Joint angles and their limits.
+    Encoders,
+    /// Size, blur, exposure and texture.
+    Images,
+    /// Camera models and lenses.
+    Intrinsics,
+    /// Poses of the cameras relative to the IMU.
+    Extrinsics,
+}
 
 /// Definition of a kind of fault.
 #[derive(Debug)]
@@ -244,60 +331,6 @@ impl FaultKind {
     /// True if this kind has the other one as a special case.
     pub fn contains(self, other: Self) -> bool {
         other.row().general.contains(&self)
-    }
-
-    /// Faults of this kind with the values of its row, for each of the joints or pairs of them.
-    pub fn trials(self, joints: &[String]) -> Vec<Fault> {
-        let row = self.row();
-        let chosen = |choice: Choice| Fault { choice: Some(choice), ..self.into() };
-        match row.correction.as_ref().map_or(&[][..], |correction| correction.parts) {
-            [Part::Joint] => joints.iter().map(|joint| Fault::from(self).of_joints([joint])).collect(),
-            [Part::Joint, Part::Joint] => {
-                let pairs =
-                    (0..joints.len()).flat_map(|first| (first + 1..joints.len()).map(move |second| (first, second)));
-                pairs.map(|(first, second)| Fault::from(self).of_joints([&joints[first], &joints[second]])).collect()
-            }
-            [Part::Flip] => ImageFlip::all().map(|flip| chosen(Choice::Flip(flip))).collect(),
-            [Part::Half] => ImageHalf::all().map(|half| chosen(Choice::Half(half))).collect(),
-            _ => row.trials.iter().map(|value| Fault::new(self, &[*value])).collect(),
-        }
-    }
-}
-
-impl Fault {
-    /// Parameter of the value with a number; `None` if it is not fitted.
-    pub fn parameter(&self, number: usize) -> Option<&'static Parameter> {
-        let parameters = self.kind.row().parameters;
-        parameters.get(number).or(parameters.last())
-    }
-
-    /// Changes the value with a number, as its parameter says.
-    pub fn change(&mut self, number: usize, change: f64) {
-        match self.kind.row().change(number) {
-            Change::Ratio => self.values[number] *= 1.0 + change,
-            Change::Sum => self.values[number] += change,
-            Change::Rotation => {
-                let rotation = self.mount() * so3::exp(&Vector3::ith(number, change));
-                self.values = so3::log(&rotation).iter().copied().collect();
-            }
-        }
-    }
-
-    /// Faults of a kind from which a fit of some values starts, for a joint or several.
-    pub fn starts(kind: FaultKind, joints: &[&String], values: usize) -> Vec<Self> {
-        let row = kind.row();
-        let start = |first: &f64| {
-            let others = (1..values).map(|number| row.change(number).neutral());
-            let values: Vec<f64> = std::iter::once(*first).chain(others).collect();
-            Self::new(kind, &values).of_joints(joints.iter().copied())
-        };
-        row.starts.iter().map(start).collect()
-    }
-
-    /// Left-handed frame of a gyroscope: its rotations are reversed.
-    pub fn left_handed() -> Self {
-        let identity = SignedAxes::all().next().expect("the identity is the first one");
-        Self::of_axes(FaultKind::GyroscopeAxes, identity.negated())
     }
 }
 
