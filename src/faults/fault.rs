@@ -162,7 +162,7 @@ impl Fault {
     /// Parameter of the value with a number; `None` if it is not fitted.
     pub fn parameter(&self, number: usize) -> Option<&'static Parameter> {
         let parameters = self.kind.row().parameters;
-        parameters.get(number).or(parameters.last())
+        parameters.get(number).or_else(|| parameters.last())
     }
 
     /// Changes the value with a number, as its parameter says.

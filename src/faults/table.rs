@@ -311,7 +311,7 @@ impl Row {
 
     /// Composition of a value with its change; a value that is not fitted is a factor or, in a shift, an addition.
     pub(super) fn change(&self, number: usize) -> Change {
-        let parameter = self.parameters.get(number).or(self.parameters.last());
+        let parameter = self.parameters.get(number).or_else(|| self.parameters.last());
         parameter.map_or(Change::Ratio, |parameter| parameter.change)
     }
 }

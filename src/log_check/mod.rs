@@ -8,7 +8,6 @@ mod clock_alignment;
 mod extrinsics;
 mod gimbal;
 mod ground_truth;
-mod hypotheses;
 mod images;
 mod imu;
 mod noise;

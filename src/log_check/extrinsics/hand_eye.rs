@@ -9,11 +9,11 @@ use crate::faults::{Fault, FaultKind, USELESS_DELAY_S};
 use crate::geometry::{best_rotation, so3};
 use crate::gimbal::ClassicalChain;
 use crate::log_check::clock_alignment::{ClockAlignment, RotationReference, align_clocks};
-use crate::log_check::hypotheses::{self, Outcome, WithinNoise};
 use crate::log_check::imu::ImuFacts;
 use crate::log_check::report::{Area, Findings, ImageRotation, Measurement, Severity};
 use crate::log_check::rotations::data::{JOINED_S, RotationData, joined};
 use crate::log_check::rotations::fit::{FREE_ORIENTATION_RAD, FitPriors, RotationFit, RotationPair};
+use crate::log_check::rotations::hypotheses::{self, Outcome, WithinNoise};
 use crate::log_check::statistics::median;
 use crate::log_check::survey::Survey;
 use crate::sensors::{CameraMount, CameraRig, Rig};
@@ -245,7 +245,7 @@ impl HandEye<'_> {
             return HandEyeOutcome::Other;
         };
         if let Some((cause, of_cause)) = found.decisive {
-            Outcome::Decisive(cause, of_cause).report(key, &evidence, "", findings);
+            Outcome::Decisive(Box::new(cause), of_cause).report(key, &evidence, "", findings);
         } else if fit.spread < MIN_SPREAD {
             let title = format!("{key} rotated about one axis only: its orientation cannot be checked");
             findings.add(Severity::Note, Area::Extrinsics, title, evidence, "rotate about all axes");

@@ -88,7 +88,7 @@ fn hypotheses(run: &DiagnosedRun<'_>, fault: &Fault) -> Option<Vec<TrialHypothes
         _ if row.correction.is_some() => {
             let hypothesis =
                 TrialHypothesis::correction(Fault { values, camera: None, since_s: None, ..fault.clone() });
-            vec![fault.since_s.map_or(hypothesis.clone(), |since_s| hypothesis.starting(step_at(since_s)))]
+            vec![fault.since_s.map_or_else(|| hypothesis.clone(), |since_s| hypothesis.starting(step_at(since_s)))]
         }
         _ => Vec::new(),
     })

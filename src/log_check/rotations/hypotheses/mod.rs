@@ -14,12 +14,12 @@ use rayon::prelude::*;
 use self::candidates::{candidates, intrinsics};
 use self::fit::{Fitted, Fitter, Hypothesis, length_s};
 use self::focal_grid::FocalGrid;
-use super::report::{Area, Findings, Severity};
-use super::rotations::data::RotationData;
-use super::rotations::fit::RotationFit;
+use super::data::RotationData;
+use super::fit::RotationFit;
 use crate::faults::{Explanation as _, Fault, FaultKind, MOST_REMAINING, Sentence, Subject};
 use crate::geometry::SignedAxes;
 use crate::gimbal::ClassicalChain;
+use crate::log_check::report::{Area, Findings, Severity};
 use crate::sensors::CameraMount;
 
 /// Difference of the criterion by which a hypothesis must be better than another to exclude it: odds of e⁻¹⁰.
@@ -33,34 +33,38 @@ const UNEXPLAINED_IMPROVEMENT: f64 = 0.1;
 
 /// Cause of a misfit in words and with its value.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct NamedCause {
+pub(in crate::log_check) struct NamedCause {
     area: Area,
-    pub(super) sentence: Sentence,
+    pub(in crate::log_check) sentence: Sentence,
     /// `None` if the fit does not give its value.
-    pub(super) fault: Option<Fault>,
+    pub(in crate::log_check) fault: Option<Fault>,
 }
 
 /// Result of a comparison of all hypotheses.
-pub(super) enum Outcome {
+pub(in crate::log_check) enum Outcome {
     /// One cause explains the misfit, and no other does.
-    Decisive(NamedCause, String),
+    Decisive(Box<NamedCause>, String),
     /// Causes that remain, best first, each with what it leaves; may be empty.
     Open(Vec<(NamedCause, String)>),
 }
 
 /// Causes of rotations that noise explains.
-pub(super) struct WithinNoise {
+pub(in crate::log_check) struct WithinNoise {
     /// Cause with what it leaves, if it is much more likely than none.
-    pub(super) decisive: Option<(NamedCause, String)>,
+    pub(in crate::log_check) decisive: Option<(NamedCause, String)>,
     /// Causes that explain the rotations as well as another orientation of the camera does, the most likely first.
-    pub(super) instead_of_orientation: Vec<NamedCause>,
+    pub(in crate::log_check) instead_of_orientation: Vec<NamedCause>,
     /// Number of them that are more likely than another orientation.
-    pub(super) more_likely: usize,
+    pub(in crate::log_check) more_likely: usize,
 }
 
 /// Searches for the cause of a misfit between the rotations of a camera and their prediction by a chain. An orientation
 /// that differs from the rig's by more than the tolerance counts as a fault.
-pub(super) fn explain(data: &RotationData<'_>, chain: &ClassicalChain, orientation_tolerance_rad: f64) -> Outcome {
+pub(in crate::log_check) fn explain(
+    data: &RotationData<'_>,
+    chain: &ClassicalChain,
+    orientation_tolerance_rad: f64,
+) -> Outcome {
     let Some(mut comparison) = Comparison::new(data, chain, orientation_tolerance_rad) else {
         return Outcome::Open(Vec::new());
     };
@@ -69,7 +73,7 @@ pub(super) fn explain(data: &RotationData<'_>, chain: &ClassicalChain, orientati
 }
 
 /// Searches for faults that are within the noise of single rotations, such as a jump of a joint late in the log.
-pub(super) fn explain_within_noise(
+pub(in crate::log_check) fn explain_within_noise(
     data: &RotationData<'_>,
     chain: &ClassicalChain,
     orientation_tolerance_rad: f64,
@@ -201,7 +205,7 @@ impl<'a> Comparison<'a> {
         let is_alone = best.rivals(fitted, DECISIVE).next().is_none();
         if best.fit.is_explained() && is_alone && best.criterion + DECISIVE < self.criterion_given() {
             let (cause, evidence) = self.describe(best);
-            return Outcome::Decisive(cause, evidence);
+            return Outcome::Decisive(Box::new(cause), evidence);
         }
         let mut open: Vec<(NamedCause, String)> = Vec::new();
         for found in fitted {
@@ -232,7 +236,7 @@ impl NamedCause {
 
 impl Outcome {
     /// True if the cause, or the first of those that remain, is in this area.
-    pub(super) fn is_of(&self, area: Area) -> bool {
+    pub(in crate::log_check) fn is_of(&self, area: Area) -> bool {
         match self {
             Self::Decisive(cause, _) => cause.area == area,
             Self::Open(causes) => causes.first().is_some_and(|(cause, _)| cause.area == area),
@@ -240,7 +244,7 @@ impl Outcome {
     }
 
     /// Adds the finding; `evidence` has the numbers of the misfit as recorded.
-    pub(super) fn report(&self, key: &str, evidence: &str, remedy: &str, findings: &mut Findings) {
+    pub(in crate::log_check) fn report(&self, key: &str, evidence: &str, remedy: &str, findings: &mut Findings) {
         match self {
             Self::Decisive(cause, of_cause) => {
                 let evidence = format!("{of_cause}; as recorded: {evidence}");

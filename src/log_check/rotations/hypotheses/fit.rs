@@ -5,13 +5,13 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 
-use super::super::statistics::median;
 use crate::faults::{Explanation, Fault, FaultKind, LensChange};
 use crate::gimbal::ClassicalChain;
 use crate::log_check::rotations::data::{JOINED_S, MeasuredRotation, RotationData, joined};
 use crate::log_check::rotations::fit::{
     ExtraColumn, FREE_ORIENTATION_RAD, FitPriors, Prediction, RotationFit, RotationPair,
 };
+use crate::log_check::statistics::median;
 
 /// Prior standard deviation of the time offset of camera and gyroscope beyond the rig's.
 const OFFSET_SIGMA_S: f64 = 0.02;

@@ -1,9 +1,9 @@
 //! The hypotheses that are tried for a camera.
 
-use super::super::permutations::permutations;
 use super::fit::Hypothesis;
 use crate::faults::{Fault, FaultKind, JointUnit};
 use crate::gimbal::ClassicalChain;
+use crate::log_check::permutations::permutations;
 use crate::log_check::rotations::data::RotationData;
 use crate::sensors::CameraMount;
 
