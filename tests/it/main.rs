@@ -38,5 +38,6 @@ mod studies;
 #[cfg(feature = "gui")]
 mod study_sample;
 mod sweep;
+mod thresholds;
 mod time_travel;
 mod trajectories;

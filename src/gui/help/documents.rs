@@ -18,7 +18,7 @@ macro_rules! document {
 }
 
 /// The manual is first.
-const DOCUMENTS: [Document; 31] = [
+const DOCUMENTS: [Document; 32] = [
     document!("docs/manual.md"),
     document!("docs/tutorial.md"),
     document!("docs/recordings.md"),
@@ -32,6 +32,7 @@ const DOCUMENTS: [Document; 31] = [
     document!("docs/architecture.md"),
     document!("assets/README.md"),
     document!("docs/libraries.md"),
+    document!("docs/thresholds.md"),
     document!("docs/experiments/README.md"),
     document!("docs/experiments/images_and_front_end.md"),
     document!("docs/experiments/encoders_and_joint_angles.md"),
