@@ -22,7 +22,7 @@ use super::log_faults::LogFaults;
 use super::measured::Undoing;
 use super::misfit::Misfit;
 use super::outcome::{Diagnosis, DiagnosisVerdict, RankedCause, TruthAgreement, WaitingReason};
-use super::ranking::{RankedTrial, RankingDecision, by_cause, decide};
+use super::ranking::{RankedTrial, by_cause, decide};
 use super::refinement::refined;
 use super::scoring::{LOST, Trials, scored};
 use super::span::{confirmed_span, screened_span};
@@ -245,12 +245,7 @@ impl Search<'_, '_> {
         let mut ranked = by_cause(&given, others);
         // The columns of both clocks only find values for the shifts.
         ranked.retain(|it| it.hypothesis.cause != FaultKind::Clocks || it.hypothesis.changes.estimated.is_empty());
-        let decision = decide(&given, &ranked);
-        (diagnosis.verdict, diagnosis.explaining) = match decision {
-            RankingDecision::One => (DiagnosisVerdict::Cause, 1),
-            RankingDecision::Several(count) => (DiagnosisVerdict::Several, count),
-            RankingDecision::None => (DiagnosisVerdict::Unexplained, 0),
-        };
+        (diagnosis.verdict, diagnosis.explaining) = decide(&given, &ranked);
         let with_truth = self.run.inputs.iter().any(|input| input.ground_truth.is_some());
         let helps = ranked.into_iter().filter(|it| it.score < given.score).take(REPORTED);
         diagnosis.causes = helps

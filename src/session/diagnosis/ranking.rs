@@ -7,6 +7,7 @@
 use super::agreement::disagreement;
 use super::hypotheses::TrialHypothesis;
 use super::misfit::{Misfit, Scale};
+use super::outcome::DiagnosisVerdict;
 use super::trial::TrialResult;
 use crate::faults::{Choice, Explanation, Fault, FaultKind, MOST_REMAINING, criterion};
 
@@ -39,17 +40,6 @@ const MARGIN_RATIO: f64 = 0.05;
 const REMAINING: f64 = 0.4;
 /// Smallest gain of images without a half of them, relative to the score of the run: halves of sound images differ, too.
 const REGION_RATIO: f64 = 0.2;
-
-/// Conclusion from the ranked causes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum RankingDecision {
-    /// The first cause explains the residuals, and no other one does.
-    One,
-    /// Number of causes that explain them about as well.
-    Several(usize),
-    /// No cause explains them.
-    None,
-}
 
 /// Score of a trial.
 pub(super) fn score(hypothesis: &TrialHypothesis, misfit: &Misfit, given: &Misfit, scale: &Scale) -> f64 {
@@ -92,19 +82,20 @@ fn margin(gain: f64) -> f64 {
     MARGIN.max(MARGIN_RATIO * gain)
 }
 
-/// Decision about ranked causes; `given` is the run without a change.
-pub(super) fn decide(given: &RankedTrial, ranked: &[RankedTrial]) -> RankingDecision {
-    let Some(best) = ranked.first() else { return RankingDecision::None };
+/// Verdict about ranked causes, and the number of those that explain the residuals; `given` is the run without a change.
+pub(super) fn decide(given: &RankedTrial, ranked: &[RankedTrial]) -> (DiagnosisVerdict, usize) {
+    const UNEXPLAINED: (DiagnosisVerdict, usize) = (DiagnosisVerdict::Unexplained, 0);
+    let Some(best) = ranked.first() else { return UNEXPLAINED };
     let gain = given.score - best.score;
     let (before, after) = (disagreement(&given.misfit), disagreement(&best.misfit));
     if gain < MARGIN || (after > 1.0 && after > REMAINING * before) {
-        return RankingDecision::None;
+        return UNEXPLAINED;
     }
     // A cause that leaves a disagreement does not compete with one that leaves none.
     let as_good = |it: &&RankedTrial| after > 1.0 || disagreement(&it.misfit) <= 1.0;
     match best.rivals(ranked, margin(gain)).filter(as_good).count() {
-        0 => RankingDecision::One,
-        rivals => RankingDecision::Several((rivals + 1).min(MOST_REMAINING)),
+        0 => (DiagnosisVerdict::Cause, 1),
+        rivals => (DiagnosisVerdict::Several, (rivals + 1).min(MOST_REMAINING)),
     }
 }
 
@@ -140,7 +131,7 @@ mod tests {
         RankedTrial { hypothesis, result: TrialResult::default(), misfit, score }
     }
 
-    fn decision(given_px: f64, causes: &[(FaultKind, f64)]) -> (RankingDecision, Vec<FaultKind>) {
+    fn decision(given_px: f64, causes: &[(FaultKind, f64)]) -> ((DiagnosisVerdict, usize), Vec<FaultKind>) {
         let given = misfit(given_px);
         let all = causes.iter().map(|(cause, px)| candidate(*cause, ForkChanges::default(), *px, &given)).collect();
         let given = candidate(FaultKind::Focal, ForkChanges::default(), given_px, &given);
@@ -153,13 +144,13 @@ mod tests {
     fn one_cause_several_or_none() {
         let (focal, shutter, chain) = (FaultKind::Focal, FaultKind::Shutter, FaultKind::Chain);
         let (found, order) = decision(1.5, &[(shutter, 0.9), (focal, 0.1), (focal, 0.4), (chain, 1.5)]);
-        assert_eq!((found, order), (RankingDecision::One, vec![focal, shutter, chain]));
-        assert_eq!(decision(1.5, &[(shutter, 0.1), (focal, 0.1), (chain, 1.5)]).0, RankingDecision::Several(2));
-        assert_eq!(decision(1.5, &[(shutter, 1.4), (focal, 1.5)]).0, RankingDecision::None);
+        assert_eq!((found, order), ((DiagnosisVerdict::Cause, 1), vec![focal, shutter, chain]));
+        assert_eq!(decision(1.5, &[(shutter, 0.1), (focal, 0.1), (chain, 1.5)]).0, (DiagnosisVerdict::Several, 2));
+        assert_eq!(decision(1.5, &[(shutter, 1.4), (focal, 1.5)]).0, (DiagnosisVerdict::Unexplained, 0));
         // A more general cause does not compete with its special case.
         let (found, order) = decision(1.5, &[(FaultKind::Intrinsics, 0.1), (focal, 0.1)]);
-        assert_eq!((found, order), (RankingDecision::One, vec![focal, FaultKind::Intrinsics]));
-        assert_eq!(decision(1.5, &[]).0, RankingDecision::None);
+        assert_eq!((found, order), ((DiagnosisVerdict::Cause, 1), vec![focal, FaultKind::Intrinsics]));
+        assert_eq!(decision(1.5, &[]).0, (DiagnosisVerdict::Unexplained, 0));
     }
 
     #[test]
