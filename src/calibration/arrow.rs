@@ -131,7 +131,7 @@ impl Band {
 
     /// Replaces the factor `L` by the entries of `(L Lᵀ)⁻¹` within the band, both triangles of its diagonal blocks.
     ///
-    /// An entry of the inverse depends only on those of later columns within the band (Erisman and Tinney, *On
+    /// An entry of the inverse depends only on the entries of later columns within the band (Erisman and Tinney, *On
     /// Computing Certain Elements of the Inverse of a Sparse Matrix*, CACM 1975), here by blocks from the last column
     /// back. Sums have a fixed order for any number of threads.
     fn invert(&mut self) {
@@ -323,7 +323,7 @@ impl ArrowFactor {
     /// the border's Schur complement is not positive definite.
     pub(super) fn covariances(self, ranges: &[Range<usize>]) -> Option<Vec<DMatrix<f64>>> {
         let Self { mut band, mut border, corner } = self;
-        // From `L⁻¹Cᵀ` to `A⁻¹Cᵀ`, which adds the uncertainty of the border to that of the band.
+        // From `L⁻¹Cᵀ` to `A⁻¹Cᵀ`, which adds the uncertainty of the border to the uncertainty of the band.
         border.par_iter_mut().for_each(|row| band.backward(row));
         band.invert();
         let shared = if corner.is_empty() { corner } else { corner.cholesky()?.inverse() };

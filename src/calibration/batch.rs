@@ -14,7 +14,7 @@ const STEP_NS: i64 = 10_000_000;
 pub struct BatchPose {
     /// Time in nanoseconds since the start of the log.
     pub stamp_ns: i64,
-    /// Pose of the IMU. Position and yaw of the first one are those of the sliding-window estimator.
+    /// Pose of the IMU. Position and yaw of the first one are taken from the sliding-window estimator.
     pub world_from_imu: RigidTransform,
     /// Covariance relative to position and yaw of the first pose; `None` for poses that are not adjusted, or if not
     /// requested ([`CalibrationOptions::pose_covariances`](super::CalibrationOptions::pose_covariances)).

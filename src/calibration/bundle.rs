@@ -39,7 +39,7 @@ pub(super) struct Bundle<'a> {
     pub(super) tracks: &'a [BundleTrack],
 }
 
-/// Normal equations; those of the visual factors are kept over the view poses.
+/// Normal equations; the equations of the visual factors are kept over the view poses.
 pub(super) struct BundleEquations {
     visual: VisualEquations,
     maps: BTreeMap<ViewId, ViewMap>,
@@ -73,7 +73,8 @@ impl Bundle<'_> {
         self.pixels.cost(&self.poses(estimate), self.tracks, &estimate.landmarks) + 2.0 * costs.total()
     }
 
-    /// Passes all factors but the reprojections to a sink; columns are those of the band, then of the border.
+    /// Passes all factors but the reprojections to a sink; the columns of the band come first, then the columns of the
+    /// border.
     fn factors(&self, estimate: &BundleEstimate, sink: &mut impl Sink) {
         for frame_set in 1..self.frame_sets.len() {
             sink.take(self.imu_factor(frame_set, estimate));

@@ -1,4 +1,4 @@
-//! Conversion of the front end's tracks to those of the bundle.
+//! Conversion of the front end's tracks to tracks of the bundle.
 
 use std::collections::BTreeMap;
 

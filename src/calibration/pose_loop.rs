@@ -42,7 +42,7 @@ const MEDIAN_LENGTH: f64 = 1.538_172_254_455_05;
 pub(super) struct PosePair {
     /// Pose of the vehicle at the gimbal camera's image, from the static camera's trajectory.
     pub(super) world_from_imu: RigidTransform,
-    /// Measured `segment_from_camera`.
+    /// Measured pose of the camera, `segment_from_camera`.
     pub(super) segment_from_camera: RigidTransform,
     pub(super) encoder: JointAngles,
 }

@@ -145,7 +145,7 @@ impl Innovations {
         for (density, sums) in NoiseDensity::all().zip(&mut self.sums) {
             let rows = density.rows();
             for (index, other) in factors.iter().enumerate() {
-                // Block of R between the density's rows of this interval and those of `other`.
+                // Block of R between the density's rows of this interval and the rows of `other`.
                 let mut block = -(jacobian(other).rows_range(rows.clone()) * gains.columns_range(rows.clone()));
                 if index == own {
                     block += DMatrix::identity(rows.len(), rows.len());

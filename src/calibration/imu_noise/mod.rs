@@ -33,8 +33,7 @@ const LARGEST_STEP: f64 = 2.8;
 const LARGEST_RELATIVE_SIGMA: f64 = 0.5;
 /// Deviation of χ² above which a density is inconsistent, in standard deviations.
 const CONTRADICTION_SIGMAS: f64 = 3.0;
-/// Loss of the observations: quadratic for noise, so that their information is that of their noise, which is fitted
-/// too.
+/// Loss of the observations: quadratic for noise, so that their information matches their noise, which is fitted too.
 const LOSS: RobustLoss = RobustLoss::Huber(3.0);
 /// Interval of the steps whose residuals are used; an IMU interval stays in the window for longer.
 const STRIDE: usize = 3;
@@ -87,8 +86,8 @@ pub enum ImuNoiseError {
     Interrupted,
 }
 
-/// Fits the noise densities to a flight, starting from those of `config`; calls `on_progress` with a fraction from 0 to
-/// 1.
+/// Fits the noise densities to a flight, starting from the densities of `config`; calls `on_progress` with a fraction
+/// from 0 to 1.
 ///
 /// # Errors
 /// If the flight is too short, or if `on_progress` breaks.

@@ -11,7 +11,7 @@ use crate::simulation::{SyntheticMotion, SyntheticMount, SyntheticOptions, synth
 /// Standard deviation of encoder readings; unused for a rigid camera.
 const NO_ENCODERS: f64 = 1.0;
 
-/// Fits a flight of `seconds` whose true densities are those of the rig times `factor`.
+/// Fits a flight of `seconds` whose true densities are the densities of the rig times `factor`.
 fn fitted(seed: u64, factor: f64, seconds: f64) -> FlightNoise {
     let flight = synthetic_tracks(&SyntheticOptions {
         mount: SyntheticMount::Static,

@@ -109,7 +109,7 @@ impl<'a> StillsLoops<'a> {
         self.with_map(state, station, place, set.residual(&state.chain, &state.further, &state.joints_rad[place]))
     }
 
-    /// `r + D·u`.
+    /// Residual `r + D·u` with the deviations of the map.
     fn with_map(&self, state: &StillsState, station: usize, place: usize, mut residual: DVector<f64>) -> DVector<f64> {
         let set = self.sets[place];
         residual += &set.by_gimbal_map * state.gimbal_map_m[place];

@@ -26,7 +26,7 @@ use crate::sensors::{StillSet, Stills};
 /// Set with refined camera poses.
 #[derive(Clone, Debug)]
 pub(super) struct ObservedSet {
-    /// Index in [`Stills::sets`].
+    /// Index of the set in [`Stills::sets`].
     pub(super) index: usize,
     pub(super) id: u64,
     pub(super) station: u64,
@@ -44,11 +44,11 @@ pub(super) struct ObservedSet {
 
 /// Whitened residual of a set with its derivatives.
 pub(super) struct SetRows {
-    /// 6K × 1.
+    /// Residual of the K rigid cameras (6K × 1).
     pub(super) residual: DVector<f64>,
-    /// 6K × dof.
+    /// Derivative by the parameters of the chain (6K × dof).
     pub(super) by_chain: DMatrix<f64>,
-    /// 6K × N.
+    /// Derivative by the joint angles (6K × N).
     pub(super) by_joints: DMatrix<f64>,
     /// By `[φ; δt]` of each rigid camera after the first one (6K × 6·further).
     pub(super) by_further: DMatrix<f64>,

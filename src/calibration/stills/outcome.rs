@@ -18,7 +18,7 @@ pub struct PixelStatistics {
 }
 
 impl PixelStatistics {
-    /// `None` without values.
+    /// Summary of some values; `None` if there are none.
     pub(super) fn of(values: &[f64]) -> Option<Self> {
         let count = values.len() as f64;
         let mean_px = values.iter().sum::<f64>() / count;
@@ -154,7 +154,7 @@ pub struct AxisAngle {
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct StillsCorrelations {
     pub names: Vec<String>,
-    /// By rows.
+    /// Entries of the matrix by rows.
     pub values: Vec<Vec<f64>>,
 }
 
@@ -181,8 +181,8 @@ pub struct StillsOutcome {
     pub stations: usize,
     pub floors: Vec<CameraFloor>,
     pub scores: Vec<StillsScore>,
-    /// Noise of readings and map; that of the encoders for free angles by the encoder model on the same sets, for a given
-    /// chain a robust estimate and no noise of the map.
+    /// Noise of readings and map. For free angles the noise of the encoders is estimated by the encoder model on the
+    /// same sets; for a given chain it is a robust estimate, and there is no noise of the map.
     pub noise: StillsNoise,
     pub axes: Vec<AxisAngle>,
     /// Parameterization in which the chain is reported first, minimal and far from its singularities.

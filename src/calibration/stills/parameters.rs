@@ -162,7 +162,7 @@ pub(super) fn rigid_parameters(
     parameters
 }
 
-/// Angles between consecutive axes; their σ is that of the twist in the reported parameterization.
+/// Angles between consecutive axes; σ of an angle is the σ of the twist in the reported parameterization.
 pub(super) fn axes(
     chain: &ClassicalChain,
     initial: &ClassicalChain,

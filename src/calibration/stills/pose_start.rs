@@ -92,7 +92,7 @@ fn real_roots(coefficients: &[f64; 5]) -> Vec<f64> {
     roots.iter().filter(|root| root.im.abs() <= REAL * (1.0 + root.re.abs())).map(|root| root.re).collect()
 }
 
-/// Rigid transform that maps the corners of one triangle to those of another one, by least squares.
+/// Rigid transform that maps the corners of one triangle to the corners of another one, by least squares.
 fn aligned(from: &[Vector3<f64>; 3], to: &[Vector3<f64>; 3]) -> Option<RigidTransform> {
     let centre = |points: &[Vector3<f64>; 3]| (points[0] + points[1] + points[2]) / 3.0;
     let (from_centre, to_centre) = (centre(from), centre(to));

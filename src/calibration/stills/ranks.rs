@@ -16,7 +16,7 @@ use crate::text::Named as _;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum AngleKnowledge {
-    /// Readings without error.
+    /// Encoder readings without error.
     Known,
     /// Readings with the estimated noise of the encoders.
     Encoder,
