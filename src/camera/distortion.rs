@@ -26,7 +26,7 @@ pub enum Distortion {
 }
 
 impl Distortion {
-    /// Kalibr's name.
+    /// Kalibr's name of the model.
     pub fn name(&self) -> &'static str {
         match self {
             Self::None => "none",

@@ -20,7 +20,7 @@ pub enum CameraError {
     },
     #[error("{field} of '{model}' holds {found} numbers, expected {expected}: {meaning}")]
     Count {
-        /// `intrinsics` or `distortion_coeffs`.
+        /// Key of the list: `intrinsics` or `distortion_coeffs`.
         field: &'static str,
         model: &'static str,
         found: usize,

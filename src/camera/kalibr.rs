@@ -7,7 +7,7 @@ impl CameraModel {
     /// `resolution`.
     ///
     /// `intrinsics` holds `fx fy cx cy`, preceded by `xi` for omni, `alpha beta` for eucm and `xi alpha` for ds.
-    /// `plumb_bob` and `rational_polynomial` are those of ROS and `OpenCV`, with 4 or 5 and with 8 coefficients;
+    /// `plumb_bob` and `rational_polynomial` are the models of ROS and `OpenCV`, with 4 or 5 and with 8 coefficients;
     /// `radial-tangential`, `equi`, `fisheye` and an empty distortion name are accepted too.
     ///
     /// # Errors

@@ -5,7 +5,7 @@ use super::CameraError;
 /// Map from bearings to the normalized image plane, before distortion (Kalibr's `camera_model`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Projection {
-    /// Pinhole, `(x/z, y/z)`.
+    /// Pinhole projection `(x/z, y/z)`.
     Pinhole,
     /// Unified model of Mei and Rives: the unit sphere seen from a point `xi` behind its centre.
     Omni {
@@ -29,7 +29,7 @@ pub enum Projection {
 }
 
 impl Projection {
-    /// Kalibr's name.
+    /// Kalibr's name of the model.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Pinhole => "pinhole",
