@@ -34,7 +34,6 @@ pub(crate) struct Arguments {
     pub command: Option<Command>,
 }
 
-/// The sub-commands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     /// Open the window on a log; without a display, write screenshots instead and print their paths.

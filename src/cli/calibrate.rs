@@ -63,7 +63,7 @@ pub(crate) fn calibrate(arguments: &CalibrateArguments) -> Result<ExitOutcome> {
     }
 }
 
-/// Calibrates from one log after the other; the files are those of the last calibration, which includes all before it.
+/// Calibrates from one log after the other and writes the files of the last calibration, which includes all before it.
 fn calibrate_logs(arguments: &CalibrateArguments) -> Result<ExitOutcome> {
     let limits = arguments.limits.limits();
     let prepared =

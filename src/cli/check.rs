@@ -26,7 +26,7 @@ pub(crate) struct CheckArguments {
     /// Folder for proposed masks, CAMERA.mask.png, of each camera with an image region that never moves.
     #[arg(long, value_name = "FOLDER")]
     pub write_masks: Option<PathBuf>,
-    /// Overwrite existing masks.
+    /// Overwrite masks that exist already.
     #[arg(long, requires = "write_masks")]
     pub force: bool,
     /// Print the findings as JSON.

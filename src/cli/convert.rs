@@ -28,7 +28,7 @@ pub(crate) struct ConvertArguments {
     /// the folder that gets mav0.
     #[arg(short, long, visible_alias = "out", value_name = "LOG.mcap|DIR")]
     pub output: PathBuf,
-    /// Format to write.
+    /// Format of the written log.
     #[arg(long = "to", value_enum, value_name = "FORMAT", default_value = "mcap")]
     pub format: ConvertedFormat,
     /// With --to euroc: the rig of the log; default: next to the log or attached to it.
@@ -66,10 +66,9 @@ pub(crate) struct ConvertArguments {
     pub limits: LimitArguments,
 }
 
-/// Values of `--to`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum ConvertedFormat {
-    /// A flight log.
+    /// A flight log (MCAP).
     Mcap,
     /// A folder in EuRoC's (ASL) format, for other estimators.
     Euroc,

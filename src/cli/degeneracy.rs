@@ -50,7 +50,7 @@ pub(crate) struct DegeneracyArguments {
     /// Add an IMU that moves with the camera, its biases unknown.
     #[arg(long, conflicts_with_all = ["table", "columns"])]
     pub gimbal_imu: bool,
-    /// Sensor columns in addition to those of the chain: readout, timeshift, intrinsics, imu-intrinsics, all;
+    /// Sensor columns in addition to the columns of the chain: readout, timeshift, intrinsics, imu-intrinsics, all;
     /// intrinsics of the IMU need `--poses imu` [default: chain].
     #[arg(long, value_name = "NAME,…")]
     pub columns: Option<SensorColumns>,
@@ -72,10 +72,9 @@ pub(crate) struct DegeneracyArguments {
     pub json: bool,
 }
 
-/// Values of `--poses`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum PosesArgument {
-    /// Known exactly.
+    /// Poses are known exactly.
     Known,
     /// From the IMU, its biases unknown.
     Imu,

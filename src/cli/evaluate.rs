@@ -14,7 +14,7 @@ use crate::cli::terminal::print_report;
 pub(crate) struct EvaluateArguments {
     /// The estimated trajectory: TUM (t x y z qx qy qz qw) or a table in EuRoC's format.
     pub estimate: PathBuf,
-    /// The reference trajectory.
+    /// Reference trajectory, in one of the same formats.
     pub reference: PathBuf,
     /// Alignment of the estimate to the reference.
     #[arg(long, value_enum, default_value_t = AlignArgument::Se3)]
@@ -30,10 +30,9 @@ pub(crate) struct EvaluateArguments {
     pub json: bool,
 }
 
-/// Values of `--align`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum AlignArgument {
-    /// No alignment.
+    /// Compare without an alignment.
     None,
     /// Rotation about the vertical and translation.
     Yaw,

@@ -34,7 +34,7 @@ pub(crate) struct ExcerptArguments {
     /// Ground-truth rig file; default: next to the log (LOG with .truth.yaml).
     #[arg(long = "truth", value_name = "FILE")]
     pub ground_truth: Option<PathBuf>,
-    /// Overwrite existing files.
+    /// Overwrite files that exist already.
     #[arg(long)]
     pub force: bool,
     /// Print excerpt.json instead of the table.

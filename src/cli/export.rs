@@ -22,7 +22,7 @@ use crate::cli::terminal::{print, print_json};
 pub(crate) struct ExportArguments {
     /// The rig, or a log (.mcap) with its rig next to it or attached to it.
     pub rig: PathBuf,
-    /// The program.
+    /// Program or format to write for.
     #[arg(long = "to", value_enum, value_name = "PROGRAM")]
     pub program: ProgramArgument,
     /// Folder for the files.
@@ -66,7 +66,7 @@ pub(crate) enum ProgramArgument {
     /// Estimator, camera chain and IMU.
     #[value(name = "openvins")]
     OpenVins,
-    /// Calibration.
+    /// Calibration of cameras and IMU.
     Basalt,
     /// Settings for one camera and the IMU.
     #[value(name = "orb-slam3")]
@@ -96,7 +96,7 @@ fn joint_angle(text: &str) -> Result<(String, f64), String> {
         .ok_or_else(|| "expected a joint and its angle in degrees, as in pitch=-30".to_owned())
 }
 
-/// Output of `--json`.
+/// Output of the command with `--json`.
 #[derive(Serialize)]
 struct Written<'a> {
     program: &'static str,

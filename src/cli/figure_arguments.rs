@@ -22,14 +22,14 @@ pub(crate) struct FigureArguments {
     /// Start of the time range of all plots, in seconds since the first message of the log.
     #[arg(long, value_name = "SECONDS", value_parser = seconds, requires = "to")]
     pub from: Option<f64>,
-    /// End of the time range of all plots; without --at the values are those of this time.
+    /// End of the time range of all plots; without --at, values are shown at this time.
     #[arg(long, value_name = "SECONDS", value_parser = seconds, requires = "from")]
     pub to: Option<f64>,
     /// Width of a figure for a paper in millimetres, for example 85 or 175 for one or two columns; with it the panel is
     /// drawn without the cursor line (unless --at is given) and PNGs have 300 dpi.
     #[arg(long, value_name = "MM", value_parser = side_mm, conflicts_with_all = ["size", "scale", "controls"])]
     pub width_mm: Option<f64>,
-    /// Height of a figure in millimetres; default: that of the content.
+    /// Height of a figure in millimetres [default: height of the content].
     #[arg(long, value_name = "MM", value_parser = side_mm, conflicts_with_all = ["size", "scale", "controls"])]
     pub height_mm: Option<f64>,
     /// Size of the labels of a figure in points (default: 8).

@@ -10,7 +10,7 @@ use dcvins::files::output;
 
 use crate::cli::terminal::print;
 
-/// Date of the release in the headers of manual pages, that of the changelog.
+/// Date of the release in the headers of manual pages, as in the changelog.
 const RELEASED: &str = "2026-11-27";
 
 /// Name and version in the footers of manual pages.

@@ -87,7 +87,7 @@ pub(crate) fn run() -> anyhow::Result<ExitOutcome> {
     }
 }
 
-/// The message of an error followed by those of its causes that it does not contain.
+/// The message of an error followed by the messages of its causes that it does not contain.
 pub(crate) fn message(error: &anyhow::Error) -> String {
     let mut text = error.to_string();
     for cause in error.chain().skip(1).map(ToString::to_string) {

@@ -44,7 +44,6 @@ pub(crate) struct NoiseArguments {
     pub limits: LimitArguments,
 }
 
-/// Values of `--method`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Method {
     /// The Allan deviation if at least 10 s are stationary, else the flight.

@@ -36,7 +36,7 @@ pub(crate) struct PlanArguments {
     /// Duration of the motion.
     #[arg(long, value_name = "SECONDS", default_value_t = PLAN_SECONDS, value_parser = duration)]
     pub duration: f64,
-    /// Quantity to minimize.
+    /// Quantity that the search minimizes.
     #[arg(long, value_enum, default_value_t = Criterion::Worst)]
     pub criterion: Criterion,
     /// Parameters that matter, such as pitch.d [default: all].
@@ -89,7 +89,6 @@ pub(crate) struct PlanArguments {
     pub json: bool,
 }
 
-/// Values of `--criterion`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Criterion {
     /// The largest ratio of σ to the prior's σ.
@@ -215,7 +214,7 @@ impl PlanArguments {
         })
     }
 
-    /// Parameters of `--parameters`.
+    /// Parameters that `--parameters` names.
     fn chosen(&self, situation: &Situation) -> Result<Vec<ParameterId>> {
         let known = situation.chain.parameters();
         let mut chosen = Vec::new();

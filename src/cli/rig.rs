@@ -17,7 +17,6 @@ use crate::cli::terminal::print;
 
 #[derive(Args, Clone, Debug)]
 pub(crate) struct RigArguments {
-    /// Command for rigs.
     #[command(subcommand)]
     pub command: RigCommand,
 }
@@ -96,7 +95,6 @@ pub(crate) struct NewArguments {
     pub limits: LimitArguments,
 }
 
-/// Value of `--attitude`.
 #[derive(Clone, Debug)]
 pub(crate) struct Attitude {
     topic: String,
@@ -152,7 +150,7 @@ fn attitude(text: &str) -> Result<Attitude, String> {
         .ok_or_else(|| format!("expected a topic and entries {}=VALUE between commas", KEYS.join("=VALUE, ")))
 }
 
-/// Chain of `--urdf`.
+/// Chain that the robot description of `--urdf` defines; `None` without one.
 fn described_chain(arguments: &NewArguments, log: Option<&FlightLog>) -> Result<Option<DescribedChain>> {
     let (Some(urdf), Some((imu, camera, axes))) = (&arguments.urdf, arguments.links.given()) else {
         return Ok(None);

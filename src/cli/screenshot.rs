@@ -60,7 +60,7 @@ pub(crate) struct ScreenshotArguments {
     /// Also write the values of the panel as CSV, next to the screenshot.
     #[arg(long)]
     pub csv: bool,
-    /// Size in pixels.
+    /// Size of the screenshot in pixels.
     #[arg(long, value_name = "WxH", default_value = "1920x1080", value_parser = size)]
     pub size: [usize; 2],
     /// Pixels per point: 2 draws everything twice as large.
@@ -97,12 +97,11 @@ pub(crate) struct ScreenshotArguments {
     pub cache: CacheArguments,
 }
 
-/// Values of `--format`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum FormatArgument {
-    /// Portable Network Graphics.
+    /// Portable Network Graphics, pixels.
     Png,
-    /// Scalable Vector Graphics.
+    /// Scalable Vector Graphics, shapes.
     Svg,
     /// Portable Document Format, one page of the size of the figure.
     Pdf,
@@ -118,16 +117,14 @@ impl FormatArgument {
     }
 }
 
-/// Values of `--renderer`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum RendererArgument {
     /// The program's own painter.
     Cpu,
-    /// A graphics adapter.
+    /// A graphics adapter, through wgpu.
     Wgpu,
 }
 
-/// Values of `--theme`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum ThemeArgument {
     /// Dark text on a light background.
@@ -370,7 +367,7 @@ fn of_study(arguments: &ScreenshotArguments) -> Result<ExitOutcome> {
     Ok(ExitOutcome::Success)
 }
 
-/// The requested format, else that of the file's extension, else PNG.
+/// The requested format, else the format of the file's extension, else PNG.
 fn format_of(arguments: &ScreenshotArguments) -> Result<FormatArgument> {
     let extension = arguments.output.extension().map(|extension| extension.to_string_lossy().to_lowercase());
     let named = match extension.as_deref() {
@@ -436,8 +433,8 @@ impl Shown {
         Ok(Self { source, log_end_ns, start_s, duration_s, motion })
     }
 
-    /// Cache entry of the screenshots; `None` for a saved session, and for a graphics adapter, because its images
-    /// differ from those of other adapters.
+    /// Cache entry of the screenshots; `None` for a saved session, and for a graphics adapter, because two adapters
+    /// draw different images.
     fn cached(&self, arguments: &ScreenshotArguments, format: FormatArgument) -> Option<CachedResult> {
         let Source::Log(plan, _) = &self.source else { return None };
         if arguments.renderer == RendererArgument::Wgpu {
@@ -456,7 +453,7 @@ impl Shown {
         )
     }
 
-    /// Computes the runs up to a stamp; those of a saved session to their end.
+    /// Computes the runs up to a stamp; runs of a saved session are computed to their end.
     fn compute(&mut self, until_ns: i64, interrupt: &Interrupt) -> Result<Computation> {
         match &mut self.source {
             Source::Log(plan, _) => {

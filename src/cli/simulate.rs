@@ -22,7 +22,7 @@ pub(crate) struct SimulateArguments {
     /// The log to write; its rig and the ground truth of the rig get the same name with .rig.yaml and .truth.yaml.
     #[arg(short, long, visible_alias = "out", value_name = "LOG.mcap")]
     pub output: PathBuf,
-    /// Surfaces with texture.
+    /// Surfaces that have a texture.
     #[arg(long, value_enum, value_name = "KIND", default_value = "textured")]
     pub world: WorldArgument,
     /// Swing the vehicle's heading by up to this angle in degrees to both sides of what there is to see, every 8 s, while
@@ -51,8 +51,8 @@ pub(crate) struct SimulateArguments {
     /// Omit the static camera: half the computing time and half the file size.
     #[arg(long)]
     pub no_static_camera: bool,
-    /// Add an IMU on the gimbal, which the rig has as imu1; the factor applies to its noise and biases, 1 for those of
-    /// the vehicle's IMU.
+    /// Add an IMU on the gimbal, which the rig has as imu1; the factor multiplies the noise and biases of the vehicle's
+    /// IMU.
     #[arg(long, value_name = "FACTOR", num_args = 0..=1, require_equals = true, default_missing_value = "1")]
     pub gimbal_imu: Option<f64>,
     /// Overwrite any existing log, rig or ground truth of that name. Without it, only a simulated log with its
@@ -73,13 +73,13 @@ pub(crate) struct SimulateArguments {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum ExperimentArgument {
-    /// The paper's T1.
+    /// The paper's experiment T1.
     T1,
-    /// The paper's T2.
+    /// The paper's experiment T2.
     T2,
-    /// The paper's T3.
+    /// The paper's experiment T3.
     T3,
-    /// The paper's T4.
+    /// The paper's experiment T4.
     T4,
 }
 
@@ -94,7 +94,6 @@ pub(crate) enum WorldArgument {
     Facades,
 }
 
-/// Values of `--encoder-sigma-deg`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum EncoderArgument {
     /// No encoders in the log.

@@ -36,7 +36,6 @@ pub(crate) struct StillsArguments {
     pub without: Vec<u64>,
 }
 
-/// Values of `--joint-angles`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum JointAnglesArgument {
     /// Readings with noise, its σ estimated per joint; wrong readings are found and named.
