@@ -38,7 +38,7 @@ pub struct ParameterReport {
 /// Ranks of the chain's calibration over the whole log.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct CalibrationRank {
-    /// Number of parameters.
+    /// Number of calibration parameters.
     pub columns: usize,
     pub rank_structural: usize,
     /// Number of directions with σ below 10° and 3 cm from the log alone.
@@ -47,7 +47,7 @@ pub struct CalibrationRank {
     pub verdict: String,
 }
 
-/// Content of `calibration.json`.
+/// Content of the file `calibration.json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CalibrationReport {
     /// File name of the log.

@@ -12,7 +12,7 @@ use crate::session::accuracy::{
     relative_errors,
 };
 
-/// Options of a comparison of two trajectories; the defaults are those of `evo_ape tum --align` and `evo_rpe tum
+/// Options of a comparison of two trajectories; the defaults are the settings of `evo_ape tum --align` and `evo_rpe tum
 /// --align`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EvaluationOptions {

@@ -23,12 +23,12 @@ const AIM_RATIO: f64 = 1.1;
 const REASONS: usize = 3;
 const MIN_REASON: f64 = 1.05;
 
-/// Content of `excerpt.json`.
+/// Content of the file `excerpt.json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct ExcerptSummary {
     pub log: String,
     pub run: String,
-    /// Requested duration.
+    /// Requested duration of all stretches, in seconds.
     pub seconds: f64,
     pub stretches: Vec<ExcerptStretch>,
     pub parameters: Vec<ExcerptParameter>,
@@ -48,7 +48,7 @@ pub struct ExcerptStretch {
 #[derive(Clone, Debug, Serialize)]
 pub struct ExcerptParameter {
     pub name: String,
-    /// Predicted σ of the stretches, divided by that of the whole flight.
+    /// Predicted σ of the stretches, divided by the σ of the whole flight.
     pub predicted_ratio: f64,
     /// The same from a run over the stretches.
     pub achieved_ratio: Option<f64>,

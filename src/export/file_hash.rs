@@ -1,4 +1,4 @@
-//! SHA-256 of files.
+//! Hash (SHA-256) of a file's content.
 
 use std::fs::File;
 use std::io::{self, Read as _};

@@ -23,7 +23,7 @@ pub(super) fn write_files<N: AsRef<Path>, C: AsRef<[u8]>>(
     Ok(paths)
 }
 
-/// Removes those of the files with these names in a folder that are not among `written`: they are of an earlier result.
+/// Removes the files with these names in a folder that are not among `written`: they belong to an earlier result.
 pub(super) fn remove_others(names: &[&str], written: &[PathBuf], folder: &Path) -> Result<(), ExportError> {
     let paths = names.iter().map(|name| folder.join(name));
     for path in paths.filter(|path| !written.contains(path) && path.is_file()) {

@@ -14,7 +14,7 @@ fn file_name(camera_key: &str) -> String {
     format!("{camera_key}.mask.png")
 }
 
-/// True if a file name can be that of a mask of a run's rig.
+/// True if a file of this name may be a mask of a run's rig.
 pub(super) fn is_mask_name(name: &str) -> bool {
     name.strip_suffix(".mask.png")
         .and_then(|key| key.strip_prefix("cam"))

@@ -11,7 +11,7 @@ use crate::files::csv_writer::{CsvWriter, number_cell};
 use crate::files::output;
 use crate::simulation::{MotionSample, MotionSplines, PrescribedMotion};
 
-/// Columns before and after those of the joints.
+/// Columns before and after the columns of the joints.
 const TIME: &str = "t_s";
 const VEHICLE: [&str; 4] = ["x_m", "y_m", "z_m", "heading_rad"];
 /// End of the name of a joint's column.

@@ -60,7 +60,7 @@ struct NamedPosterior<'a> {
     cameras: Vec<String>,
     rig: &'a Rig,
     prior: Option<&'a FlightPrior>,
-    /// Log and run.
+    /// Name of the log and of the run.
     source: String,
 }
 

@@ -66,7 +66,7 @@ impl ResultKeyBuilder {
         Ok(builder)
     }
 
-    /// Adds an option.
+    /// Adds an option to the key.
     pub fn add_text(&mut self, text: &str) {
         self.hash.update((text.len() as u64).to_le_bytes());
         self.hash.update(text);

@@ -169,7 +169,7 @@ pub fn draw_panel_svg(
 /// The values of a panel as CSV; of the options run, slide and motion have an effect.
 ///
 /// # Errors
-/// If the name is not that of a single panel.
+/// If no single panel has this name.
 pub fn panel_csv(
     name: &str,
     recording: &Recording,

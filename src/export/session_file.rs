@@ -21,7 +21,8 @@ pub fn read_session(path: &Path) -> Result<SavedSession, ExportError> {
         .map_err(|problem| ExportError::Session { problem: Box::new(problem), path: path.to_owned() })
 }
 
-/// Starts the runs of a saved session, from the calibration of earlier flights if it has one; `path` is that of the session.
+/// Starts the runs of a saved session, from the calibration of earlier flights if it has one; `path` is the session's
+/// file.
 ///
 /// # Errors
 /// If the log or that calibration cannot be opened, or an entry of the session is invalid.

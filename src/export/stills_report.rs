@@ -16,7 +16,7 @@ const MIN_CORRELATION: f64 = 0.9;
 /// Largest number of printed pairs.
 const MAX_PAIRS: usize = 6;
 
-/// Content of `calibration.json`.
+/// Content of the file `calibration.json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StillsReport {
     /// File name of the stills.

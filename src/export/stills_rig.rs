@@ -16,7 +16,8 @@ const BOUND_PER_SIGMA: f64 = 1.732_050_807_568_877_2;
 /// Bounds of the prior without standard deviations.
 const ASSUMED_PRIOR: ChainPrior = ChainPrior { translation_bound_m: 0.01, rotation_bound_rad: 0.0175 };
 
-/// Rig with the chain, its uncertainty as prior, and the rigid cameras; the IMU frame is that of the first rigid camera.
+/// Rig with the chain, its uncertainty as prior, and the rigid cameras; the frame of the first rigid camera is the IMU
+/// frame.
 pub(super) fn rig_of_stills(stills: &Stills, outcome: &StillsOutcome) -> Rig {
     let camera = |index: usize, camera: &StillCamera, mount: CameraMount| CameraRig {
         key: format!("cam{index}"),

@@ -58,7 +58,7 @@ pub fn draw_study_panel_svg(
 /// The values of a panel of a study as CSV.
 ///
 /// # Errors
-/// If the name is not that of a single panel, or the study does not have the columns.
+/// If no single panel has this name, or the study does not have the columns.
 pub fn study_panel_csv(name: &str, study: &Arc<Study>, view: &StudyOptions) -> Result<String, ScreenshotError> {
     let panel = panel_of(name)?.ok_or_else(|| ScreenshotError::UnknownStudyPanel { name: name.to_owned() })?;
     Ok(state_of(study, view)?.csv_table(panel))

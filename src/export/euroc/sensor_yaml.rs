@@ -24,8 +24,8 @@ pub(super) fn imu_yaml(imu: &ImuRig) -> String {
     out
 }
 
-/// Description of a camera; `body_from_camera` is its pose, of a camera on a gimbal at one time, which is that of the
-/// first image if its angles were `measured`.
+/// Description of a camera; `body_from_camera` is its pose, for a camera on a gimbal the pose at one time: the time of
+/// the first image if its angles were `measured`.
 pub(super) fn camera_yaml(camera: &CameraRig, body_from_camera: Option<&RigidTransform>, measured: bool) -> String {
     let mut out = head("camera", &camera.topic);
     if camera.mount == CameraMount::Gimbal {

@@ -2,7 +2,7 @@
 //! landmarks, tracks and residuals over the image, calibration, rank and frame statistics as time series, and events.
 //!
 //! Topics and frames begin with the run's label, so that the files of several runs can be opened together. Log times
-//! are those of the images, so that playback is synchronous with the log; stamps are the estimator's.
+//! are the log times of the images, so that playback is synchronous with the log; stamps are the estimator's.
 
 mod annotations;
 mod series;
@@ -17,7 +17,7 @@ use crate::gimbal::ClassicalChain;
 use crate::session::{Recording, RunRecord, StepRecord};
 use series::{Names, Series};
 
-/// World frame common to all runs: that of the ground truth if there is one.
+/// World frame common to all runs: the frame of the ground truth if there is one.
 const WORLD: &str = "world";
 /// Period of the path messages in nanoseconds.
 const PATH_PERIOD_NS: i64 = 1_000_000_000;

@@ -19,7 +19,8 @@ use crate::study::hex;
 const MAX_BYTES: u64 = 20 << 30;
 /// Bytes of the hash in the name of an entry.
 const NAME_BYTES: usize = 12;
-/// File of an entry with the paths of its sources, one per line; its modification time is that of the last use.
+/// File of an entry with the paths of its sources, one per line; its modification time is the time of the entry's last
+/// use.
 const SOURCES: &str = "sources.txt";
 /// Start of the name of an entry that is being written.
 const UNFINISHED: &str = ".unfinished-";

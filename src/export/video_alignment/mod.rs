@@ -27,7 +27,7 @@ const SECTION_S: f64 = 12.0;
 /// Fraction of the progress that the first conversion takes.
 const CONVERTED: f64 = 0.5;
 
-/// Alignment of a video's clock with that of an autopilot's log, with its evidence.
+/// Alignment of a video's clock with the clock of an autopilot's log, with its evidence.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VideoAlignment {
     /// Clock of the video relative to the log.
@@ -115,10 +115,10 @@ impl fmt::Display for VideoAlignment {
     }
 }
 
-/// Estimates the time offset of a video in the autopilot's log of `options` within ±60 s of the first guess, which is
-/// that of the conversion: by the rotations of the images, or by the specific forces of both IMUs where the images do not
-/// agree with the autopilot's gyroscope, as on a gimbal without recorded angles. The camera model is that of `rig`, else the one that the conversion assumes. Temporary files lie
-/// in the folder of `output`.
+/// Estimates the time offset of a video in the autopilot's log of `options` within ±60 s of the offset found by the
+/// conversion: by the rotations of the images, or by the specific forces of both IMUs where the images do not agree
+/// with the autopilot's gyroscope, as on a gimbal without recorded angles. The camera model is taken from `rig`,
+/// without one it is the model that the conversion assumes. Temporary files are written into the folder of `output`.
 ///
 /// # Errors
 /// If the sources cannot be converted, or the rotations do not determine a unique offset.
