@@ -7,11 +7,11 @@ use nalgebra::{DMatrix, DVector};
 /// Thin singular value decomposition `A = U·diag(s)·Vᵀ` of an m × n matrix, with k = min(m, n) singular values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ThinSvd {
-    /// m × k.
+    /// Left singular vectors as columns (m × k).
     pub u: DMatrix<f64>,
-    /// In descending order.
+    /// Singular values (k × 1), in descending order.
     pub singular_values: DVector<f64>,
-    /// n × k.
+    /// Right singular vectors as columns (n × k).
     pub v: DMatrix<f64>,
 }
 

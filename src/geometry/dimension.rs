@@ -5,13 +5,10 @@ use super::principal_angle;
 /// Physical dimension of a parameter; written to files as the symbol of its unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 pub enum Dimension {
-    /// Radians.
     #[serde(rename = "rad")]
     Angle,
-    /// Metres.
     #[serde(rename = "m")]
     Length,
-    /// Seconds.
     #[serde(rename = "s")]
     Time,
     #[serde(rename = "px")]

@@ -39,7 +39,7 @@ impl RigidTransform {
         Some(Self::new(rotation, matrix.fixed_view::<3, 1>(0, 3).into_owned()))
     }
 
-    /// 4×4 homogeneous matrix.
+    /// Homogeneous matrix `[R t; 0 1]` (4 × 4).
     pub fn to_matrix(self) -> Matrix4<f64> {
         let mut matrix = Matrix4::identity();
         matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(&self.rotation_matrix());

@@ -58,7 +58,7 @@ impl SignedAxes {
         self.matrix() * vector
     }
 
-    /// The other frame's axes as those of this one.
+    /// Axes of this frame in the other frame, from the other frame's axes in this one.
     pub fn inverse(&self) -> Self {
         let mut inverse = self.0;
         for (axis, (source, is_negative)) in self.0.into_iter().enumerate() {

@@ -42,7 +42,7 @@ struct Portion {
     changed: Vec<usize>,
 }
 
-/// `I − τ·v·vᵀ`.
+/// Householder reflection `I − τ·v·vᵀ`.
 #[derive(Clone, Copy, Debug, Default)]
 struct Reflection {
     tau: f64,
@@ -237,7 +237,7 @@ struct Application<'a, const N: usize> {
     /// Index of the first reflection's vector.
     index: usize,
     factor: &'a mut [f64],
-    /// Columns of `R`.
+    /// Number of columns of `R`.
     count: usize,
     /// Row of `R` of the first reflection.
     row: usize,
