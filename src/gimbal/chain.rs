@@ -150,7 +150,7 @@ impl Chain {
         }
     }
 
-    /// Parameters in the order of the columns; those of a rigid chain belong to the main camera.
+    /// Parameters in the order of the columns; without joints they are the extrinsics of the main camera.
     pub fn parameters(&self) -> Vec<ParameterId> {
         let mut parameters = self.all_parameters();
         parameters.retain(|parameter| !self.hides(*parameter));

@@ -10,9 +10,9 @@ pub struct DhLink {
     pub theta_offset_rad: f64,
     /// Link offset d along the joint axis.
     pub d_m: f64,
-    /// Link length a.
+    /// Length `a` of the link, in metres.
     pub a_m: f64,
-    /// Link twist α.
+    /// Twist `α` of the link, in radians.
     pub alpha_rad: f64,
 }
 

@@ -122,7 +122,7 @@ fn split_end(block: &ChainFrame, swapped: bool) -> End {
     }
 }
 
-/// `Rz(−angle)·v`.
+/// Vector `Rz(−angle)·v` (3 × 1).
 fn rotated_back(angle_rad: f64, v: &Vector3<f64>) -> Vector3<f64> {
     let (sine, cosine) = angle_rad.sin_cos();
     Vector3::new(cosine * v.x + sine * v.y, cosine * v.y - sine * v.x, v.z)

@@ -46,8 +46,8 @@ pub fn stacked_jacobian(chain: &Chain, joint_angles_rad: &[Vec<f64>]) -> DMatrix
     stacked
 }
 
-/// Returns the Jacobian of the columns of `to` with respect to those of `from`, for two parameterizations of
-/// one mechanism (`to.dof()` × `from.dof()`).
+/// Jacobian of the columns of `to` by the columns of `from` (`to.dof()` × `from.dof()`), for two parameterizations of
+/// one mechanism.
 ///
 /// Least squares over generic joint angles: exact where `to` is regular, of least norm where it is singular.
 /// All entries are NaN when a value of the chains is not finite.

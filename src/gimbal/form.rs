@@ -23,7 +23,7 @@ pub(super) struct MinimalChain {
 pub(super) enum Form {
     Classical(ClassicalChain),
     Minimal(MinimalChain),
-    /// `X0 … XN`.
+    /// Initial transforms `X0 … XN` of the product of exponentials.
     Poe(Vec<RigidTransform>),
     /// Chain without joints: a single rigid transform in every parameterization but the classical one.
     Rigid(RigidTransform),

@@ -1,8 +1,8 @@
 //! Forward kinematics and its closed-form derivatives, by one pass along the chain for all parameterizations.
 //!
 //! Every column is an elementary motion: a rotation about an axis `w` through a point `p`, with the column
-//! `[Rᵀ·w; w × (t − p)]`, or a translation along `w`, with the column `[0; w]`. `R` and `t` are those of the
-//! camera (docs/mathematics.md, section 6).
+//! `[Rᵀ·w; w × (t − p)]`, or a translation along `w`, with the column `[0; w]`. `R` and `t` are rotation and position
+//! of the camera (docs/mathematics.md, section 6).
 
 use nalgebra::{Matrix6xX, Vector3};
 

@@ -77,9 +77,9 @@ impl Chain {
 
     /// Returns `self ⊟ origin` (dof), the step with `origin.plus(self.minus(origin)) = self`.
     ///
-    /// A chain in another parameterization is converted to that of `origin`. In `poe` the two sides may differ by
-    /// screws along joint axes that cancel between neighbouring transforms; the equality then holds for the forward
-    /// kinematics.
+    /// A chain in another parameterization is first converted to the parameterization of `origin`. In `poe` the two
+    /// sides may differ by screws along joint axes that cancel between neighbouring transforms; the equality then holds
+    /// for the forward kinematics.
     ///
     /// # Panics
     ///

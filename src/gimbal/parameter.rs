@@ -51,7 +51,7 @@ pub enum ParameterPart {
     Encoder,
     /// Intrinsics of the gyroscope, and its rotation relative to the accelerometer.
     Gyroscope,
-    /// Intrinsics of the accelerometer; its axes define those of the IMU.
+    /// Intrinsics of the accelerometer; its axes are the axes of the IMU frame.
     Accelerometer,
     /// Orientation of the IMU on the gimbal in the camera's frame relative to the rig's, and its clock.
     GimbalImu,
@@ -61,15 +61,10 @@ pub enum ParameterPart {
 pub enum Quantity {
     /// Rotation about x: of a rotation vector, or an angle of the minimal base block.
     Rx,
-    /// Rotation about y.
     Ry,
-    /// Rotation about z.
     Rz,
-    /// Translation along x.
     Tx,
-    /// Translation along y.
     Ty,
-    /// Translation along z.
     Tz,
     /// Joint offset θ of a link.
     Theta,

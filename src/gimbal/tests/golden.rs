@@ -67,7 +67,7 @@ fn names_of(chain: &Chain) -> Vec<String> {
     chain.parameters().into_iter().map(|parameter| ParameterNames::default().name(parameter)).collect()
 }
 
-/// Compares the values of a chain with those of the file: by name, rigid transforms as matrices.
+/// Compares the values of a chain with the values in the file: by name, rigid transforms as matrices.
 pub(crate) fn check_values(chain: &Chain, values: &Value, tolerance: f64, context: &str) {
     let found = chain.values();
     let parameters = chain.parameters();
@@ -278,8 +278,8 @@ fn block(by_rotation: &Matrix2x3<f64>, by_translation: &Matrix2x3<f64>) -> DMatr
     )
 }
 
-/// Derivative of `[φ; δt]` of `world_from_imu · imu_from_camera` with respect to that of `world_from_imu` (the paper's
-/// Eq. 13 in the right convention).
+/// Derivative of `[φ; δt]` of `world_from_imu · imu_from_camera` by `[φ; δt]` of `world_from_imu` (the paper's Eq. 13
+/// in the right convention).
 fn imu_to_world_camera(world_from_imu: &RigidTransform, imu_from_camera: &RigidTransform) -> DMatrix<f64> {
     let mut jacobian = SMatrix::<f64, 6, 6>::identity();
     let arm = world_from_imu.rotation_matrix() * so3::hat(&imu_from_camera.translation_m);
