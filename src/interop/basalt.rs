@@ -75,7 +75,7 @@ enum Lens {
     Ds { xi: f64, alpha: f64 },
 }
 
-/// `basalt_calib.json`.
+/// File `basalt_calib.json` of a rig, with name and content.
 pub(super) fn files(rig: &Rig, head: &[String]) -> Vec<(String, Vec<u8>)> {
     let noise = &rig.imu.noise;
     let (calib_accel_bias, calib_gyro_bias) = imu_parameters(&rig.imu.intrinsics);

@@ -9,7 +9,7 @@ use crate::text::Named;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum TimeOffset {
     PerCamera,
-    /// One for all cameras, that of the first.
+    /// One offset for all cameras: the first camera's.
     One,
     None,
 }

@@ -5,7 +5,7 @@ use super::{OtherEstimator, text::imu_from_camera};
 use crate::files::yaml::{number, numbers, text as scalar};
 use crate::sensors::{CameraRig, ImuRig, Rig};
 
-/// `camchain-imucam.yaml` and `imu.yaml`.
+/// Files `camchain-imucam.yaml` and `imu.yaml` of a rig, with names and contents.
 pub(super) fn files(rig: &Rig, head: &[String]) -> Vec<(String, Vec<u8>)> {
     let mut chain = text::comments(head);
     chain.push_str("# T_cam_imu maps points from the IMU to the camera; t_imu = t_cam + timeshift_cam_imu.\n");

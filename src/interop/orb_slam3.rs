@@ -7,7 +7,7 @@ use crate::camera::Distortion;
 use crate::files::yaml::number;
 use crate::sensors::Rig;
 
-/// `orb_slam3.yaml`.
+/// File `orb_slam3.yaml` of a rig, with name and content.
 pub(super) fn files(rig: &Rig, head: &[String]) -> Vec<(String, Vec<u8>)> {
     let camera = &rig.cameras[0];
     let [fx, fy, cx, cy] = camera.model.intrinsics_px;

@@ -1,4 +1,4 @@
-//! Key lists are those of the programs' example files (EuRoC, TUM-VI, T265), parsed by a parser of their format.
+//! Lists of keys are copied from the programs' example files (EuRoC, TUM-VI, T265), parsed by a parser of their format.
 
 use std::path::Path;
 

@@ -70,7 +70,7 @@ pub(super) fn quoted(text: &str) -> String {
     serde_json::Value::from(text).to_string()
 }
 
-/// `key: value` lines.
+/// YAML lines `key: value` in the order of the entries.
 pub(super) fn entries(entries: &[(&str, String)]) -> String {
     entries.iter().map(|(key, value)| format!("{key}: {value}\n")).collect::<Vec<_>>().concat()
 }

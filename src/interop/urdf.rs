@@ -14,7 +14,7 @@ const IMU_LINK: &str = "imu_link";
 
 /// A robot description of the IMU, the gimbal and these cameras; all if no key is given.
 ///
-/// The frame of a camera's link has x right, y down and z forward; joint angles are those of the encoders.
+/// The frame of a camera's link has x right, y down and z forward; joint angles are encoder readings.
 ///
 /// # Errors
 /// If a key does not belong to the rig.
