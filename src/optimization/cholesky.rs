@@ -118,7 +118,7 @@ impl Cholesky {
         }
     }
 
-    /// Response of the other unknowns to the last `count` ones, `−A₁₁⁻¹ A₁₂`. Rows are those of the matrix; they are
+    /// Response of the other unknowns to the last `count` ones, `−A₁₁⁻¹ A₁₂`. It has the rows of the matrix; they are
     /// zero for the last unknowns and for unknowns that are not in the order.
     pub(crate) fn leading_response(&self, count: usize, rows: usize) -> DMatrix<f64> {
         let first = self.count() - count;
@@ -271,7 +271,7 @@ impl WithSimd for Factorization<'_> {
     }
 }
 
-/// Factors the columns of a panel; its first rows are those of the diagonal.
+/// Factors the columns of a panel, whose first rows are the rows of the diagonal block.
 #[inline(always)]
 fn factor_panel(panel: &mut [f64], height: usize, width: usize) -> bool {
     for column in 0..width {

@@ -26,7 +26,7 @@ const DEPENDENT: f64 = 1e-12;
 /// of the observations up to this one, and are conditioned on the landmark's posterior from the previous ones.
 #[derive(Debug, Default)]
 pub(crate) struct LandmarkRows {
-    /// Row-major.
+    /// Entries of the matrix, row by row.
     entries: Vec<f64>,
     width: usize,
     /// Blocks of columns: anchor, shared block, observers.
@@ -41,7 +41,7 @@ pub(crate) struct LandmarkRows {
 /// Rows that an observation adds.
 #[derive(Clone, Debug)]
 struct AddedRows {
-    /// Row range; after the elimination, the rows of the landmark follow those of the last observation.
+    /// Row range; after the elimination, the rows of the landmark follow the rows of the last observation.
     rows: Range<usize>,
     /// Number of leading blocks on which the rows depend.
     blocks: usize,
@@ -133,7 +133,7 @@ struct Elimination<'a>(&'a mut LandmarkRows);
 impl NullaryFnOnce for Elimination<'_> {
     type Output = ();
 
-    /// Applies Householder reflections to the landmark's rows so far together with those of the next observation.
+    /// Applies Householder reflections to the landmark's rows so far together with the rows of the next observation.
     #[inline(always)]
     fn call(self) {
         let LandmarkRows { entries, width, added, products, .. } = self.0;
@@ -162,7 +162,7 @@ impl NullaryFnOnce for Elimination<'_> {
                     break;
                 }
             }
-            // Move the landmark's rows directly before those of the next observation.
+            // Move the landmark's rows directly before the rows of the next observation.
             part.rotate_left(filled * width);
             *rows = begin..rows.end - filled;
         }

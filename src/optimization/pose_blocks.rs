@@ -74,7 +74,7 @@ impl PoseBlocks {
         if row <= column { *self.block(row, column) } else { self.block(column, row).transpose() }
     }
 
-    /// Mutable [`Self::block`].
+    /// Mutable reference to [`Self::block`].
     pub(crate) fn block_mut(&mut self, row: usize, column: usize) -> &mut Matrix6<f64> {
         let index = self.index(row, column);
         &mut self.blocks[index]

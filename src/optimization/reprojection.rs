@@ -23,7 +23,7 @@ use crate::geometry::{RigidTransform, tangent_basis};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct CameraPose {
-    /// `world_from_camera`.
+    /// Rotation matrix of `world_from_camera`.
     pub(crate) rotation: Matrix3<f64>,
     /// Centre of the camera in the world, in metres.
     pub(crate) position_m: Vector3<f64>,
@@ -92,7 +92,6 @@ pub(crate) trait BearingProjection {
     fn project_with_jacobian(&self, direction: &Vector3<f64>) -> Option<(Vector2<f64>, Matrix2x3<f64>)>;
 }
 
-/// Projection to pixels.
 impl BearingProjection for CameraModel {
     fn project(&self, direction: &Vector3<f64>) -> Option<Vector2<f64>> {
         self.project(direction)
@@ -139,7 +138,7 @@ impl BearingProjection for TangentPlane {
 /// Residual of one observation and its derivatives, in the unit of the projection or whitened.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Reprojection {
-    /// Predicted minus measured.
+    /// Predicted minus measured position, in pixels.
     pub(crate) residual: Vector2<f64>,
     /// Derivative by `[φ; δt]` of the anchor's camera pose; zero in the anchor's own observation.
     pub(crate) by_anchor: Matrix2x6<f64>,
@@ -151,7 +150,7 @@ pub(crate) struct Reprojection {
 
 impl Reprojection {
     /// Division by the standard deviation and multiplication by the root of the robust weight, so that `rᵀr` and `Jᵀr`
-    /// are those of the reweighted problem.
+    /// are cost and gradient of the reweighted problem.
     pub(crate) fn whitened(&self, sigma: f64, loss: RobustLoss) -> Self {
         self.weighted(sigma, self.robust_weight(sigma, loss))
     }
@@ -225,7 +224,7 @@ fn times_hat(rows: &Matrix2x3<f64>, v: &Vector3<f64>) -> Matrix2x3<f64> {
     ]))
 }
 
-/// The columns of `left`, then those of `right` (2 × 6).
+/// The columns of `left`, then the columns of `right` (2 × 6).
 #[inline]
 fn beside(left: &Matrix2x3<f64>, right: &Matrix2x3<f64>) -> Matrix2x6<f64> {
     let ([a, b, c], [d, e, f]) = (left.data.0, right.data.0);

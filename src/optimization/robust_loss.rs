@@ -6,7 +6,7 @@ const UNSEEN_SQUARED: f64 = 1e4;
 /// Robust loss ρ on the squared whitened norm `s = ‖r‖²/σ²` of a residual; a problem minimizes `½ Σ ρ(s)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RobustLoss {
-    /// `ρ(s) = s`.
+    /// Squared loss `ρ(s) = s`.
     None,
     /// Quadratic up to `k` standard deviations, linear beyond: `ρ(s) = 2k√s − k²`.
     Huber(f64),

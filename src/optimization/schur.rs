@@ -69,7 +69,7 @@ struct LandmarkBlock {
     couplings: Range<usize>,
 }
 
-/// Block of `H_pl`.
+/// Key and block (6 × 3) of `H_pl`.
 type Coupling<K> = (K, Matrix6x3<f64>);
 
 /// Normal equations of whitened reprojection residuals over camera poses and landmarks.
@@ -225,7 +225,7 @@ struct Elimination<'a, P: PoseEquations> {
     couplings: &'a [Coupling<P::Pose>],
     /// Inverse of the landmark's block.
     inverse: &'a Matrix3<f64>,
-    /// Couplings times `inverse`.
+    /// Couplings `H_pl` times `inverse` (6 × 3 each).
     weighted: &'a mut Vec<Matrix6x3<f64>>,
 }
 
