@@ -31,7 +31,7 @@ pub(super) struct RunContent {
     /// The verdict at the top of the page.
     pub(super) verdict: RunVerdict,
     pub(super) summary: RunSummary,
-    /// Calibration table, equal to that of the summary.
+    /// Calibration table, equal to the summary's.
     pub(super) estimability: Vec<FlightParameter>,
     #[serde(rename = "rank_story")]
     pub(super) rank_intervals: Vec<RankInterval>,
@@ -42,7 +42,7 @@ pub(super) struct RunContent {
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(super) struct ReportContent {
-    /// Program and version.
+    /// Name and version of this program.
     pub(super) program: &'static str,
     pub(super) command: String,
     pub(super) log: String,
@@ -60,7 +60,7 @@ pub(super) struct ReportContent {
 }
 
 impl ReportContent {
-    /// Collects the content of a recording; `summaries` are those of its runs, in order.
+    /// Collects the content of a recording; `summaries` has one summary per run, in order.
     pub(super) fn new(
         recording: &Recording,
         summaries: Vec<RunSummary>,

@@ -30,8 +30,8 @@ use crate::session::Recording;
 /// The files of each run, without measured times.
 const RUN_OPTIONS: RunFileOptions = RunFileOptions { timing: false, mcap: false, euroc_trajectory: false };
 
-/// Writes `report.html`, `report.json` and a folder for each run as `run --no-timing` does; returns the paths of all files,
-/// that of the HTML last.
+/// Writes `report.html`, `report.json` and a folder for each run as `run --no-timing` does; returns the paths of all
+/// files, with the HTML file last.
 ///
 /// # Errors
 /// If a file cannot be read or written.

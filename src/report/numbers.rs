@@ -2,7 +2,6 @@
 
 use crate::geometry::Dimension;
 
-/// Milliseconds per second.
 pub(super) const MS_PER_S: f64 = 1e3;
 
 /// A number with this number of decimals and a true minus sign; a negative zero is 0.

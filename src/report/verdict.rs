@@ -22,7 +22,6 @@ const NAMED: usize = 4;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum StatementLevel {
-    /// No problem.
     Good,
     Note,
     /// The use of the result is limited.
@@ -252,7 +251,7 @@ fn estimation(run: &RunRecord, summary: &RunSummary) -> Statement {
     statement("Estimation", mark, text, run.error.iter().cloned().collect())
 }
 
-/// Problems of the log and the rig found by `check`, and those of the reader.
+/// Problems of the log and the rig found by `check`, and warnings of the reader.
 pub(super) fn log_statement(check: Option<&CheckReport>, reader_warnings: &[String]) -> Statement {
     let of = |severity: Severity| {
         let findings = check.into_iter().flat_map(|check| &check.findings);
