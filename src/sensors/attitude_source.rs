@@ -34,7 +34,7 @@ pub struct AttitudeSource {
 /// Message type of the gimbal's attitude.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum AttitudeMessage {
-    /// `geometry_msgs/msg/QuaternionStamped`.
+    /// Orientation in a `geometry_msgs/msg/QuaternionStamped`.
     Quaternion,
     /// Orientation of a `PoseStamped`, an `Odometry` or a `TransformStamped`.
     Pose,
@@ -47,9 +47,9 @@ pub enum AttitudeMessage {
         /// Frame of the gimbal.
         child: String,
     },
-    /// `mavros_msgs/msg/GimbalDeviceAttitudeStatus`.
+    /// Status of a gimbal device, `mavros_msgs/msg/GimbalDeviceAttitudeStatus`.
     Mavros,
-    /// `px4_msgs/msg/GimbalDeviceAttitudeStatus`.
+    /// Status of a gimbal device, `px4_msgs/msg/GimbalDeviceAttitudeStatus`.
     Px4,
 }
 

@@ -15,7 +15,7 @@ const MASKED_FROM: u8 = 128;
 pub struct ImageMask {
     width: usize,
     height: usize,
-    /// Row by row.
+    /// True for masked pixels, row by row.
     masked: Arc<[bool]>,
 }
 

@@ -22,20 +22,20 @@ impl Default for ImuIntrinsics {
 /// Scale and misalignment of one sensor: `U = I + [[sx, mxy, mxz], [0, sy, myz], [0, 0, sz]]`, without units.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ScaleMisalignment {
-    /// `sx`, `sy`, `sz`.
+    /// Relative errors `sx`, `sy`, `sz` of the scales.
     pub scale: Vector3<f64>,
-    /// `mxy`, `mxz`, `myz`.
+    /// Small angles `mxy`, `mxz`, `myz` between the axes, in radians.
     pub misalignment: Vector3<f64>,
 }
 
 /// Independent parameters (15) of [`ImuIntrinsics`]: `C_a = U_a` and `C_g = Exp(r) · U_g`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ImuIntrinsicsParameters {
-    /// `U_g`.
+    /// Matrix `U_g` of the gyroscope.
     pub gyroscope: ScaleMisalignment,
     /// `r`, rotation vector in radians from the gyroscope's axes to the IMU frame.
     pub gyroscope_rotation_rad: Vector3<f64>,
-    /// `U_a`.
+    /// Matrix `U_a` of the accelerometer.
     pub accelerometer: ScaleMisalignment,
 }
 

@@ -35,7 +35,7 @@ pub struct JointMotionFit {
 }
 
 impl JointMotionFit {
-    /// Fit without readings.
+    /// Rates of a fit without any readings, with infinite standard deviation.
     pub const UNKNOWN: Self = Self {
         rate_sigma_rad_per_s: f64::INFINITY,
         acceleration_rad_per_s2: 0.0,

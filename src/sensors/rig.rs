@@ -33,7 +33,6 @@ pub struct ImuRig {
     /// True if the log times of the messages replace their header stamps, which were never set.
     pub use_log_time: bool,
     pub frame_id: String,
-    /// Nominal rate.
     pub rate_hz: f64,
     pub noise: ImuNoise,
     /// Scale and misalignment, the identity if they are not given.
@@ -41,7 +40,7 @@ pub struct ImuRig {
 }
 
 impl ImuRig {
-    /// True for the topic of its angular velocities and for that of its specific forces.
+    /// True for the topics of its angular velocities and of its specific forces.
     pub fn reads(&self, topic: &str) -> bool {
         self.topic == topic || self.accelerometer_topic.as_deref() == Some(topic)
     }
@@ -77,13 +76,12 @@ pub struct CameraRig {
     /// True if the log times of the images replace their header stamps, which were never set.
     pub use_log_time: bool,
     pub frame_id: String,
-    /// Nominal rate.
     pub rate_hz: f64,
     pub model: CameraModel,
     /// Kalibr's `timeshift_cam_imu`: `t_imu = t_cam + shift`.
     pub timeshift_cam_imu_s: f64,
-    /// Time from the exposure of the first row to that of a row after the last one: 0 for a global shutter, negative if
-    /// rows are read upwards.
+    /// Time from the exposure of the first row to the exposure of a row after the last one: 0 for a global shutter,
+    /// negative if rows are read upwards.
     pub readout_s: f64,
     /// Standard deviation of `readout_s`, `None` if it has not been measured.
     pub readout_sigma_s: Option<f64>,
@@ -161,7 +159,6 @@ pub struct GimbalRig {
     pub use_log_time: bool,
     /// `timeshift_gimbal_imu`: `t_imu = t_gimbal + shift`, for the stamps of `topic`.
     pub timeshift_gimbal_imu_s: f64,
-    /// Nominal rate.
     pub rate_hz: f64,
     /// Standard deviation of a reading, `None` without encoders.
     pub encoder_sigma_rad: Option<f64>,
