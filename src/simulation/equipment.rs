@@ -28,7 +28,7 @@ const NOMINAL_SIZE_PX: [usize; 2] = [640, 480];
 /// Lens of the simulated cameras.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Lens {
-    /// Pinhole without distortion.
+    /// Pinhole projection without distortion.
     Pinhole,
     /// Mild barrel distortion, radial–tangential.
     Radtan,
@@ -166,7 +166,7 @@ fn static_extrinsics(random: &mut RandomStream) -> RigidTransform {
     RigidTransform::new(down * optical * so3::exp(&tilt), Vector3::new(0.105, 0.003, 0.022) + shift)
 }
 
-/// Rig given to an estimator: each of the chain's `4N + 6` independent parameters (those of the minimal
+/// Rig given to an estimator: each of the chain's `4N + 6` independent parameters (the parameters of the minimal
 /// parameterization) has a uniform error within `bounds`, as at the start of the paper's experiments; static cameras
 /// have errors within the same bounds, but of at most 3 mm and 0.5° per axis. The cameras' time offset and readout are
 /// absent.
@@ -218,8 +218,8 @@ impl IntrinsicsError {
     }
 }
 
-/// Random scales and axes of an IMU: normal errors with these standard deviations, limited to twice them. The angle (in
-/// radians) is that of misalignments and of the rotation between gyroscope and accelerometer.
+/// Random scales and axes of an IMU: normal errors with these standard deviations, limited to twice them. `angle_rad`
+/// applies to misalignments and to the rotation between gyroscope and accelerometer.
 pub(crate) fn random_imu_intrinsics(scale: f64, angle_rad: f64, random: &mut RandomStream) -> ImuIntrinsics {
     let mut errors = |sigma: f64| Vector3::from_fn(|_, _| sigma * random.normal().clamp(-2.0, 2.0));
     let mut sensor = || ScaleMisalignment { scale: errors(scale), misalignment: errors(angle_rad) };

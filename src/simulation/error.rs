@@ -42,7 +42,7 @@ pub enum SimulationError {
     /// The caller stopped the conversion.
     #[error("interrupted after {images_done} of {images_total} images; nothing is written")]
     Interrupted {
-        /// Images so far.
+        /// Number of images written before the interruption.
         images_done: usize,
         /// Images of the whole log.
         images_total: usize,

@@ -9,18 +9,15 @@ use crate::geometry::smooth_step;
 /// Swing of the vehicle; a multirotor tilts to accelerate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum VehicleSwing {
-    /// No swing.
     Hover,
-    /// Forward and back.
     Forward,
-    /// Left and right.
     Sideways,
     UpDown,
     /// Quickly left and right, so that it rolls.
     Roll,
     /// Quickly forward and back, so that it pitches.
     Pitch,
-    /// About the vertical.
+    /// Rotation about the vertical.
     Yaw,
 }
 

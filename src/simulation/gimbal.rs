@@ -119,7 +119,7 @@ impl LookAround {
         amplitude * if place < 2.0 { place - 1.0 } else { 3.0 - place }
     }
 
-    /// Commanded orientation `world_from_camera`.
+    /// Commanded orientation `world_from_camera` of the camera at a time.
     fn orientation(&self, followed_heading_rad: f64, time_s: f64) -> UnitQuaternion<f64> {
         let wave = self.yaw_rad[1] * self.waves[0].at(time_s);
         let yaw = followed_heading_rad + self.yaw_rad[0] + wave + self.slew_rad(time_s);

@@ -60,7 +60,7 @@ fn world_from_gimbal_imu(scenario: &Scenario, imu: &GimbalImuRig, time_s: f64) -
 /// f(t) = R(t)ᵀ ((p(t + h) − 2 p(t) + p(t − h)) / h² − g)
 /// ```
 ///
-/// At both ends of the flight the differences are those of the nearest time within it.
+/// At both ends of the flight the differences are taken at the nearest time within it.
 fn motion_of_gimbal_imu(scenario: &Scenario, imu: &GimbalImuRig, time_s: f64, period_s: f64) -> Option<ImuMotion> {
     let h = period_s;
     let time_s = time_s.clamp(h, (scenario.trajectory.duration_s() - h).max(h));

@@ -11,7 +11,7 @@ use crate::sensors::{ChainPrior, Rig};
 #[derive(Clone, Debug, PartialEq)]
 pub struct SimulationOptions {
     pub experiment: Experiment,
-    /// Surfaces with texture.
+    /// Kind of the surfaces that the images show.
     pub world: WorldKind,
     /// Amplitude by which the vehicle's heading swings off what there is to see, at which the gimbal points; `None` for the
     /// experiment's heading and gimbal.

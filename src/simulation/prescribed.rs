@@ -55,7 +55,7 @@ impl<'a> PrescribedFlight<'a> {
     /// Motion of the joints of a rig over a flight of this duration.
     ///
     /// # Errors
-    /// If the names are not those of the rig, or an angle is beyond a stop.
+    /// If the names differ from the rig's joints, or an angle is beyond a stop.
     pub(super) fn joints(&self, joints: &[Joint], duration_s: f64) -> Result<JointMotion, SimulationError> {
         let problem = |problem: String| SimulationError::Motion { problem };
         let list = |names: &[String]| if names.is_empty() { "no joint".to_owned() } else { names.join(", ") };

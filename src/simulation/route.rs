@@ -170,7 +170,7 @@ impl Path {
     }
 }
 
-/// Chaikin's corner cutting.
+/// Smooths a polygon by one round of Chaikin's corner cutting (1974).
 fn cut_corners(points: &[Vector2<f64>], closed: bool) -> Vec<Vector2<f64>> {
     let count = points.len();
     if count < 3 {
@@ -196,7 +196,7 @@ fn cut_corners(points: &[Vector2<f64>], closed: bool) -> Vec<Vector2<f64>> {
 #[derive(Clone, Debug)]
 pub(crate) struct Cruise {
     pub(crate) pace: Manoeuvres,
-    /// Ground track.
+    /// Ground track in metres.
     pub(crate) path: Path,
     /// Height above ground, and its variation.
     pub(crate) height_m: [f64; 2],
@@ -231,7 +231,7 @@ impl Flight for Cruise {
         let along_m =
             self.pace.speed_m_per_s * moving_time_s + speed_swing_m.max(-self.pace.speed_m_per_s * moving_time_s);
         let (on_path, _) = self.path.at(along_m);
-        // The heading is that of a chord ahead: it changes before the corner.
+        // The heading follows a chord ahead, so that it changes before the corner.
         let (_, direction) = self.path.at(along_m);
         let (_, ahead) = self.path.at(along_m + 2.5);
         let side = Vector2::new(-direction.sin(), direction.cos()) * (self.wander_m * since(&self.waves[1]));
@@ -251,7 +251,6 @@ pub(crate) struct Shuttle {
     pub(crate) pace: Manoeuvres,
     /// Centre of the strokes.
     pub(crate) centre_m: Vector3<f64>,
-    /// Constant heading.
     pub(crate) heading_rad: f64,
     /// Length of a stroke from end to end.
     pub(crate) stroke_m: f64,
@@ -293,7 +292,6 @@ pub(crate) struct Station {
 #[derive(Clone, Debug)]
 pub(crate) struct Drill {
     pub(crate) position_m: Vector3<f64>,
-    /// Heading while hovering.
     pub(crate) heading_rad: f64,
     pub(crate) start_s: f64,
     pub(crate) exercise: Exercise,

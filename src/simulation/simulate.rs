@@ -40,9 +40,9 @@ const FIRST_IMAGE_S: f64 = 0.003;
 const BATCH: usize = 24;
 /// Rendered images that are averaged into one with motion blur.
 const BLUR_STEPS: usize = 7;
-/// Rows of an image that are rendered at one pose, that of their middle, if a camera has a readout. A row is then at
-/// most half a row from its exposure time: with 30 ms over 480 rows 0.03 ms, in which the image moves by 0.03 px at 2.4
-/// rad/s, the vehicle's limit.
+/// Number of image rows that are rendered at one pose, the pose at their middle row, if a camera has a readout. A row
+/// is then at most half a row from its exposure time: with 30 ms over 480 rows 0.03 ms, in which the image moves by
+/// 0.03 px at 2.4 rad/s, the vehicle's limit.
 const SHUTTER_ROWS: usize = 2;
 /// Lower bound of the mean velocity, for planning the length of a flight.
 const PLANNED_M_PER_S: f64 = 2.5;
@@ -211,7 +211,7 @@ fn fly_scenario(options: &SimulationOptions, name: &str) -> Result<Scenario, Sim
     Ok(scenario)
 }
 
-/// True rig: the firefly's, whose errors are drawn, or that of a file.
+/// True rig: the firefly's with random errors, or the rig of a file.
 fn true_rig(options: &SimulationOptions, name: &str) -> Result<Rig, SimulationError> {
     if let Some(rig) = &options.rig {
         return rig_as_truth(rig, options, name);
@@ -230,7 +230,7 @@ fn true_rig(options: &SimulationOptions, name: &str) -> Result<Rig, SimulationEr
     Ok(equipment.true_rig(name, &mut RandomStream::new(options.seed, stream::RIG)))
 }
 
-/// Message of the log by its index among those of its kind.
+/// Message of the log by its index among the messages of its kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Message {
     Truth(usize),

@@ -63,7 +63,7 @@ pub struct SyntheticOptions {
     pub clock_offsets_s: [f64; 2],
     /// Readout of the camera: each landmark is observed at the time of its row. Absent from the given rig.
     pub readout_s: f64,
-    /// Errors of the given rig's intrinsics; bearings are those of the given camera.
+    /// Errors of the given rig's intrinsics; bearings are computed with the given camera.
     pub intrinsics_error: IntrinsicsError,
     /// Standard deviations of the errors of the IMU's scales, and of its angles in radians (misalignment, rotation
     /// between the sensors). Absent from the given rig; zeros for an ideal IMU.
@@ -113,8 +113,8 @@ pub struct SyntheticFrame {
     pub index: usize,
     /// Stamp since the start of the flight.
     pub stamp_ns: i64,
-    /// IMU samples from the previous frame's stamp to this one's, both ends included and interpolated; those of the
-    /// first frame begin at the start of the flight.
+    /// IMU samples from the previous frame's stamp to this one's, both ends included and interpolated; for the first
+    /// frame, samples since the start of the flight.
     pub imu: Vec<ImuSample>,
     /// Samples of the IMU on the gimbal over the same interval; empty without one.
     pub gimbal_imu: Vec<ImuSample>,

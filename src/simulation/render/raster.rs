@@ -16,11 +16,11 @@ const NEAR_M: f64 = 0.05;
 /// Face in the frame of a camera: all quantities over depth are linear in the ray `(x, y, 1)`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Prepared {
-    /// One over depth.
+    /// Inverse depth of the three corners, in 1/m.
     pub(super) inverse_depth: [f32; 3],
     /// Texture coordinates over depth, in metres.
     pub(super) texture_m: [[f32; 3]; 2],
-    /// Sunlight over depth.
+    /// Sunlight at the three corners, divided by the depth.
     pub(super) sun: [f32; 3],
     pub(super) material: u32,
 }

@@ -19,7 +19,7 @@ const MIXED: u32 = SKY - 1;
 const AMBIENT: f32 = 0.6;
 /// Total light of sky and sun on a surface perpendicular to the sun, relative to the texture's grey.
 const BRIGHTNESS: f32 = 1.38;
-/// Grey of the haze, equal to that of the horizon.
+/// Grey of the haze, equal to the grey of the horizon.
 const HAZE: f32 = 186.0;
 /// Distance at which half of a surface's grey is replaced by haze.
 const HAZE_M: f32 = 420.0;

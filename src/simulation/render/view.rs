@@ -27,7 +27,7 @@ const DARK: f32 = f32::NAN;
 
 /// Camera prepared for rendering: the ray of every pixel, and the positions of its eight samples in the sample grid.
 ///
-/// The grid is that of a pinhole camera wide enough for all rays.
+/// The sample grid belongs to a pinhole camera wide enough for all rays.
 #[derive(Clone, Debug)]
 pub(crate) struct RenderedView {
     pub(super) width: usize,
@@ -40,7 +40,7 @@ pub(crate) struct RenderedView {
 }
 
 /// Sample grid, with one column and [`SAMPLES`] rows per pixel: sample `(i, j)` has the ray
-/// `(origin.x + (i + shift)·step.x, origin.y + j·step.y, 1)`, where the shift is that of row `j`.
+/// `(origin.x + (i + shift_j)·step.x, origin.y + j·step.y, 1)`, where row `j` has the shift `shift_j`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Grid {
     pub(super) columns: usize,

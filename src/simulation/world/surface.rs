@@ -133,7 +133,7 @@ pub(crate) fn roof(width_m: f32, height_m: f32, texels_per_m: f32, random: &mut 
     canvas.finish()
 }
 
-/// Repeating lawn.
+/// Lawn whose texture repeats every 10 m.
 pub(crate) fn grass(random: &mut RandomStream) -> WorldTexture {
     let mut canvas = Canvas::new(10.0, 10.0, 102.4, true, 96.0);
     canvas.noise(2.5, 22.0, 4, random);
@@ -163,7 +163,7 @@ pub(crate) fn asphalt(random: &mut RandomStream) -> WorldTexture {
     canvas.finish()
 }
 
-/// Repeating paving slabs.
+/// Paving slabs whose texture repeats every 8 m.
 pub(crate) fn slabs(random: &mut RandomStream) -> WorldTexture {
     let mut canvas = Canvas::new(8.0, 8.0, 64.0, true, 75.0);
     for row in 0..16 {
@@ -278,7 +278,7 @@ pub(crate) fn woods(random: &mut RandomStream) -> WorldTexture {
     canvas.finish()
 }
 
-/// Repeating soft clouds.
+/// Soft clouds whose texture repeats every 512 m.
 pub(crate) fn clouds(random: &mut RandomStream) -> WorldTexture {
     let mut canvas = Canvas::new(512.0, 512.0, 1.0, true, 128.0);
     canvas.noise(128.0, 42.0, 6, random);

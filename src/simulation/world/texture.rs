@@ -49,7 +49,7 @@ const RECIPROCALS: [f32; LARGEST_ANISOTROPY + 1] =
 /// Number of fractional bits of a position in texels.
 const FRACTION_BITS: i32 = 10;
 const FRACTION: f32 = (1 << FRACTION_BITS) as f32;
-/// Offset of the level of detail: finer than exact, for images as sharp as those of a lens.
+/// Offset of the level of detail: finer than exact, for images as sharp as the images of a lens.
 const LEVEL_BIAS: f32 = -0.2;
 
 impl WorldTexture {
