@@ -40,7 +40,6 @@ pub enum PairedVerdict {
 }
 
 impl PairedVerdict {
-    /// Name in reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::Unchanged => "unchanged",
@@ -58,7 +57,7 @@ pub struct MetricComparison {
     pub metric: String,
     /// Direction of change that is worse.
     pub direction: Direction,
-    /// Allowed relative change.
+    /// Relative change that still counts as equal.
     pub tolerance: f64,
     /// Number of pairs with a positive value in both studies.
     pub pairs: usize,

@@ -232,7 +232,7 @@ pub fn hex(bytes: &[u8]) -> String {
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct KeyedJob {
-    /// See [`StudyJob::key`].
+    /// Key of the job, see [`StudyJob::key`].
     pub key: String,
     pub job: StudyJob,
 }

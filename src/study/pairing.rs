@@ -1,7 +1,8 @@
 //! Pairing of the runs of two studies.
 //!
 //! Two runs are paired if log, disturbance, perturbation and seed are equal and the settings of their specifications
-//! are equivalent: those of `auto`, `auto:window=10` and `auto:name=before` are, because 10 keyframes are the default.
+//! are equivalent: `auto`, `auto:window=10` and `auto:name=before` have equivalent settings, because 10 keyframes are
+//! the default.
 //! A run without such a partner is paired with the run of the same name, so that `auto:pixel-noise=2,name=auto` is
 //! compared with `auto`. The key of a job, which contains the hash of the program, and paths are not used.
 

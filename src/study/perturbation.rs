@@ -34,7 +34,7 @@ pub enum RigQuantity {
     StaticRotation,
     /// The focal lengths; fx and fy of a camera change by the same factor.
     Focal,
-    /// The principal points.
+    /// The principal points of the cameras.
     Centre,
     /// The first two coefficients of the distortion.
     Distortion,
@@ -269,8 +269,8 @@ impl RigPerturbation {
         self.changes.is_empty() && self.start == PerturbationStart::Rig
     }
 
-    /// The rig with the errors drawn with a seed. `given` is the rig of the log, or that of its offline calibration for
-    /// [`PerturbationStart::Calibrated`].
+    /// The rig with the errors drawn with a seed. `given` is the rig of the log, or for
+    /// [`PerturbationStart::Calibrated`] the rig of its offline calibration.
     ///
     /// # Errors
     /// If the rig does not have a changed quantity, a camera would have impossible intrinsics, or the perturbation

@@ -52,7 +52,7 @@ pub struct FlightRecipe {
     pub start_error_deg: Option<f64>,
     /// Factor of the IMU's noise and biases.
     pub imu_noise_scale: f64,
-    /// `pinhole` or `radtan`.
+    /// Lens model: `pinhole` or `radtan`.
     pub lens: String,
 }
 

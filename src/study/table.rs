@@ -12,9 +12,9 @@ use crate::files::csv_writer::CsvWriter;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum ColumnType {
-    /// 64-bit floating point.
+    /// Floating-point number of 64 bits.
     Number,
-    /// 64-bit signed integer.
+    /// Signed integer of 64 bits.
     Integer,
     Text,
     Bool,

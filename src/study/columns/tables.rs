@@ -38,7 +38,7 @@ impl Default for StudyTables {
 }
 
 impl StudyTables {
-    /// The rows of one job, those of its frames if `with_frames`.
+    /// The rows of one job, including the rows of its frames if `with_frames`.
     pub fn of(result: &JobResult<'_>, with_frames: bool) -> Self {
         let frames = if with_frames { FrameRow::all(result) } else { Vec::new() };
         Self {

@@ -50,7 +50,7 @@ pub struct Exclusion {
     pub disturbances: Vec<String>,
     /// Names of rig errors.
     pub perturbations: Vec<String>,
-    /// Names of runs.
+    /// Names of the runs in `[[runs]]`.
     pub specs: Vec<String>,
     pub seeds: Vec<u64>,
 }

@@ -12,7 +12,6 @@ const MOST_DIGITS: u64 = 12;
 /// Default number of digits after the decimal point.
 const DIGITS: usize = 3;
 
-/// Parses `[[exclude]]`.
 pub(super) fn exclusions(root: &Section<'_>) -> Result<Vec<Exclusion>, PlanError> {
     root.sections("exclude")?.iter().map(exclusion).collect()
 }
@@ -61,7 +60,6 @@ pub(super) fn check_exclusions(root: &Section<'_>, plan: &StudyPlan) -> Result<(
     Ok(())
 }
 
-/// Parses `[[tables]]`.
 pub(super) fn tables(root: &Section<'_>) -> Result<Vec<SummaryTable>, PlanError> {
     root.sections("tables")?.iter().map(table).collect()
 }

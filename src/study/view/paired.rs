@@ -18,7 +18,7 @@ pub struct PairedDifference {
 }
 
 impl PairedDifference {
-    /// Value minus reference.
+    /// Value minus the reference's value.
     pub fn difference(&self) -> f64 {
         self.value - self.reference
     }
@@ -36,7 +36,7 @@ pub struct GroupDifference {
     pub spread: Option<Spread>,
     /// Mean difference with its 95 % interval (Student's t), `None` with fewer than two pairs.
     pub mean: Option<MeanInterval>,
-    /// Number of pairs in which the value is below that of the reference.
+    /// Number of pairs in which the value is below the reference's value.
     pub below: usize,
 }
 
@@ -64,7 +64,7 @@ fn shared_columns(table: &StudyTable, group: &str) -> Vec<&'static str> {
 /// Differences of `metric` between each group and the group named `reference`, on rows that agree in all other columns
 /// that identify a run. If several rows of the reference agree, their mean is the reference value.
 ///
-/// The groups are those of the column `group`; the reference itself is omitted. Empty without such a group.
+/// The column `group` defines the groups; the reference itself is omitted. Empty without such a group.
 pub fn paired_differences(
     table: &StudyTable,
     groups: &[RowGroup],

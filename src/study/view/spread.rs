@@ -1,4 +1,4 @@
-//! Quantiles of values.
+//! Quantiles of a set of values.
 
 use serde::Serialize;
 
@@ -7,10 +7,10 @@ use serde::Serialize;
 pub struct Spread {
     pub count: usize,
     pub min: f64,
-    /// First quartile.
+    /// First quartile, quantile 0.25.
     pub q1: f64,
     pub median: f64,
-    /// Third quartile.
+    /// Third quartile, quantile 0.75.
     pub q3: f64,
     pub max: f64,
 }

@@ -26,7 +26,7 @@ pub mod columns {
     pub const MESSAGE: &str = "message";
     /// Time of the frame with the largest error, in seconds since the log began.
     pub const WORST_FRAME_S: &str = "worst_frame_s";
-    /// Absolute trajectory error.
+    /// Column of the absolute trajectory error (RMSE, m).
     pub const ATE: &str = "ate_rmse_m";
     /// Name of a calibration parameter, in the table of parameters.
     pub const PARAMETER: &str = "parameter";
