@@ -92,7 +92,7 @@ impl StudyFolder {
     }
 }
 
-/// Sets the permissions of a temporary folder, readable only by its owner, to those of a new folder.
+/// Gives a temporary folder, readable only by its owner, the permissions of a new folder.
 fn share(folder: &Path) {
     #[cfg(unix)]
     {
