@@ -8,7 +8,7 @@ use super::entry::{Entry, numbers};
 /// A key of a `key=value` text that sets a field of `T`.
 #[derive(Debug)]
 pub struct Key<T: 'static> {
-    /// Key as written.
+    /// Key as written before the `=`.
     pub name: &'static str,
     /// Form of the value for help and messages: `on|off`, `N`, `START,LENGTH`.
     pub form: &'static str,
@@ -23,7 +23,7 @@ pub struct Key<T: 'static> {
 /// Field that a key sets, with its type and the values that it accepts.
 #[derive(Debug)]
 pub enum Field<T: 'static> {
-    /// `on` or `off`.
+    /// Switch with the values `on` and `off`.
     Switch(fn(&mut T) -> &mut bool),
     /// Whole number within a range.
     Count(fn(&mut T) -> &mut usize, RangeInclusive<usize>),
