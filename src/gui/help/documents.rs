@@ -18,7 +18,7 @@ macro_rules! document {
 }
 
 /// The manual is first.
-const DOCUMENTS: [Document; 32] = [
+const DOCUMENTS: [Document; 28] = [
     document!("docs/manual.md"),
     document!("docs/tutorial.md"),
     document!("docs/recordings.md"),
@@ -39,18 +39,14 @@ const DOCUMENTS: [Document; 32] = [
     document!("docs/experiments/gimbal_imu.md"),
     document!("docs/experiments/robustness.md"),
     document!("docs/experiments/uneven_scenes.md"),
-    document!("docs/experiments/second_pass_and_first_seconds.md"),
     document!("docs/experiments/solver_and_first_window.md"),
-    document!("docs/experiments/shutters_and_intrinsics.md"),
-    document!("docs/experiments/imu_noise.md"),
+    document!("docs/experiments/sensor_calibration.md"),
     document!("docs/experiments/rigs_and_recordings.md"),
-    document!("docs/experiments/batch_reference.md"),
     document!("docs/experiments/speed_and_memory.md"),
     document!("docs/experiments/regression_guard.md"),
     document!("docs/experiments/heading_in_an_orbit.md"),
     document!("docs/experiments/planned_motions.md"),
-    document!("docs/experiments/calibration_over_flights.md"),
-    document!("docs/experiments/tried_and_not_used.md"),
+    document!("docs/experiments/archive.md"),
 ];
 
 /// Index of an embedded document in the list; the default is the manual.
