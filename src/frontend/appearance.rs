@@ -1,30 +1,35 @@
-//! Window around a feature, prepared for comparison with other windows.
+//! Window around a feature, prepared for comparison with other windows: affine tracking with gain and offset.
+//!
+//! The window `T` with the offsets `x = (x, y)` from its centre moves by `D x + d` (Shi and Tomasi, "Good features to
+//! track", CVPR 1994). With `p = (d_x, d_y, D_xx, D_xy, D_yx, D_yy)` its derivative by `p` is the row
+//! `s = (g_x, g_y, g_x x, g_x y, g_y x, g_y y)` of the gradient `g = ∇T`, the same in every iteration (inverse
+//! compositional: Baker and Matthews, "Lucas–Kanade 20 years on", IJCV 2004). Gain `a` and offset of the brightness are
+//! eliminated by `s'`, which is `s` without its projection on `1` and `T`:
+//!
+//! ```text
+//! H = Σ s'ᵀ s'        p = H⁻¹ Σ s'ᵀ W / a        a = Σ (T − mean) W / Σ (T − mean)²
+//! ```
+//!
+//! for another window `W`. Both windows agree if their zero-mean normalized cross-correlation is close to 1.
 
 #![expect(clippy::inline_always, reason = "code not inlined is not compiled for the registers of its caller")]
 
 use nalgebra::{Matrix6, Matrix6x2, Vector2, Vector6};
 use pulp::{Arch, NullaryFnOnce};
 
-use super::lucas_kanade::REGISTER;
+use super::filters::{CENTRE, LANES, REGISTER, WINDOW};
 
-/// Side of the window in pixels.
-pub(super) const WINDOW: usize = 21;
-pub(super) const CENTRE: usize = WINDOW / 2;
 /// Pixels around the window for its gradient.
 pub(super) const MARGIN: usize = 2;
 /// Side of the window with this margin.
 pub(super) const SIDE: usize = WINDOW + 2 * MARGIN;
-/// Columns of the window, padded to whole vector registers; the padding has zero weight.
-pub(super) const LANES: usize = 24;
 /// Grey levels of a window, row by row.
 pub(super) type Rows = [[f32; LANES]; WINDOW];
 
 /// Minimum variance of a window, in squared grey levels.
 const MIN_VARIANCE: f32 = 4.0;
 
-/// Window with its gradient and the normal matrix of the comparison.
-///
-/// Padding columns are zero.
+/// Window with its gradient and the normal matrix of the comparison; padding columns are zero.
 #[derive(Debug, PartialEq)]
 pub(super) struct Appearance {
     level: f32,
@@ -32,13 +37,13 @@ pub(super) struct Appearance {
     value: Rows,
     along_x: Rows,
     along_y: Rows,
-    /// Means of the gradient and of its first moments `[gx, gy, gx·x, gx·y, gy·x, gy·y]`.
+    /// Means of the six entries of `s` over the window.
     means: [f32; 6],
-    /// Regressions of these six on the grey levels.
+    /// Regressions of the entries of `s` on the grey levels.
     regressions: [f32; 6],
-    /// Inverse of the normal matrix (6 × 6) of these six, gain and offset eliminated.
+    /// `H⁻¹` (6 × 6).
     inverse: Matrix6<f64>,
-    /// `Σ value²`.
+    /// Sum of the squares of `value`.
     square: f32,
     /// Affine displacement `[dx, dy]` and its derivatives (6 × 2, in px² and px) that a comparison finds per unit of
     /// perspective.
@@ -134,9 +139,9 @@ impl Appearance {
         offset_px * perspective.dot(offset_px) - matched
     }
 
-    /// Normalized correlation of `window` with this one, and the Gauss–Newton step of this one towards it (6 × 1):
-    /// `[dx, dy]` in pixels, then the derivatives of dx and of dy by x and y. `window` has [`Self::level`] subtracted
-    /// and padding columns of zero. `None` without positive correlation.
+    /// Zero-mean normalized cross-correlation of `window` with this one, and the Gauss–Newton step `p` of this one towards
+    /// it (6 × 1): `[d_x, d_y]` in pixels, then `D` row by row. `window` has [`Self::level`] subtracted and padding columns
+    /// of zero. `None` without positive correlation.
     pub(super) fn compare(&self, window: &Rows) -> Option<(f64, Vector6<f64>)> {
         let moments = Arch::new().dispatch(AppearanceChange { appearance: self, window });
         let area = (WINDOW * WINDOW) as f32;
@@ -147,8 +152,8 @@ impl Appearance {
         }
         let gain = f64::from(moments.common / self.square);
         let right = Vector6::from_fn(|k, _| {
-            let free = self.means[k] * moments.sum + self.regressions[k] * moments.common;
-            f64::from(moments.slopes[k] - free)
+            let projection = self.means[k] * moments.sum + self.regressions[k] * moments.common;
+            f64::from(moments.slopes[k] - projection)
         });
         Some((correlation, self.inverse * right / gain))
     }
@@ -219,15 +224,15 @@ impl NullaryFnOnce for AppearanceChange<'_> {
     }
 }
 
-/// Sums over a window.
+/// Sums over a window `W`.
 struct Moments {
-    /// Of the grey levels.
+    /// Sum of the grey levels, `Σ W`.
     sum: f32,
-    /// Of the squared grey levels.
+    /// Sum of their squares, `Σ W²`.
     square: f32,
-    /// Of the products with the grey levels of the appearance.
+    /// Correlation with the prepared window, `Σ (T − mean) W`.
     common: f32,
-    /// Of the products with the gradient and its first moments.
+    /// Correlation with the derivatives, `Σ sᵀ W`.
     slopes: [f32; 6],
 }
 

@@ -4,10 +4,17 @@
 //! It is used when its covariance is small and the images fit better under it than under no rotation.
 //! Otherwise the rotation is measured: the coarse images are aligned by robust Gauss–Newton on the rotation, a gain and an
 //! offset, starting from the prediction and from no rotation.
-//! The method follows the small blurry image of PTAM (Klein and Murray, "Improving the agility of keyframe-based SLAM").
+//! The method follows the small blurry image of PTAM (Klein and Murray, "Improving the agility of keyframe-based SLAM",
+//! ECCV 2008).
+//!
+//! With the grey levels `I` and `I'` of the previous and of the current image, the projection `π` and the bearing `f` of a
+//! pixel `x` the cost is `Σ ρ(r/s)`, `r = I'(π(R f)) − a I(x) − b`, with the loss `ρ(u) = u²/(1 + u²)` of Geman and
+//! McClure. The step is inverse compositional (Baker and Matthews, "Lucas–Kanade 20 years on", IJCV 2004): the derivative
+//! `∇I ∂π/∂f (−[f]×)` of the previous image by `φ` does not depend on `R`, and `R ← R Exp(−φ)`.
 
 use nalgebra::{Matrix2x3, Matrix3, Matrix5, RowVector2, UnitQuaternion, Vector2, Vector3, Vector5};
 
+use super::epipolar::geman_mcclure;
 use super::prediction::PredictedRotation;
 use super::pyramid::Pyramid;
 use crate::camera::CameraModel;
@@ -15,7 +22,7 @@ use crate::geometry::so3;
 use crate::optimization::damp;
 use crate::sensors::GrayImage;
 
-/// Pyramid levels beyond those of the tracker: an image of 640 pixels is then 40 pixels wide.
+/// Pyramid levels in addition to the levels of the tracker: an image of 640 pixels is then 40 pixels wide.
 pub(super) const EXTRA_LEVELS: usize = 1;
 /// A prediction with a smaller standard deviation is used unchanged, in pixels: the tracker converges from that distance.
 const ACCURATE_SIGMA_PX: f64 = 6.0;
@@ -31,7 +38,7 @@ const MIN_SCALE: f64 = 4.0;
 const MIN_CONTRAST: f64 = 2.0;
 /// Cost of a sample outside the other image; an exact match costs 0, an outlier nearly 1.
 const OUTSIDE_COST: f64 = 0.5;
-/// A prediction is rejected if its cost exceeds that of no rotation by this.
+/// A prediction is rejected if its cost exceeds the cost without a rotation by this.
 const WORSE_BY: f64 = 0.02;
 /// Gauss–Newton steps on each level, coarsest first.
 const STEPS: [usize; 2] = [10, 5];
@@ -65,7 +72,7 @@ pub(super) struct CoarseAligner {
 /// Rotation with gain and offset of the brightness, and the cost.
 #[derive(Clone, Copy)]
 struct Fit {
-    /// `camera_now_from_camera_previous`.
+    /// Rotation `R` = `camera_now_from_camera_previous`.
     rotation: UnitQuaternion<f64>,
     gain: f64,
     offset: f64,
@@ -113,7 +120,7 @@ impl CoarseAligner {
             let Some(view) = View::new(&self.camera, sampled, previous, now, prior) else { break };
             best = starts
                 .iter()
-                .map(|start| view.descend(start, steps))
+                .map(|start| view.gauss_newton(start, steps))
                 .fold(None, |best: Option<Fit>, fit| best.filter(|best| best.cost <= fit.cost).or(Some(fit)));
             starts = best.into_iter().collect();
         }
@@ -238,8 +245,8 @@ impl<'a> View<'a> {
         sum / self.samples.len().max(1) as f64
     }
 
-    /// Gauss–Newton from a start; returns the iterate with the lowest cost.
-    fn descend(&self, start: &Fit, steps: usize) -> Fit {
+    /// Gauss–Newton iterations from a start; returns the iterate with the lowest cost.
+    fn gauss_newton(&self, start: &Fit, steps: usize) -> Fit {
         let mut best = Fit { cost: f64::INFINITY, ..*start };
         let mut at = *start;
         for _ in 0..steps {
@@ -259,9 +266,7 @@ impl<'a> View<'a> {
         if cost < best.cost { Fit { cost, ..at } } else { best }
     }
 
-    /// Cost of a fit, and the step `[rotation of the previous image's bearings; gain; offset]` (5 × 1) that decreases it.
-    ///
-    /// The inverse compositional form: the gradient is that of the previous image, which does not depend on the rotation.
+    /// Cost of a fit, and the Gauss–Newton step `[φ; gain; offset]` (5 × 1) that decreases it.
     fn linearize(&self, fit: &Fit) -> (f64, Option<Vector5<f64>>) {
         let mut normal = Matrix5::<f64>::zeros();
         let mut right = Vector5::zeros();
@@ -275,26 +280,26 @@ impl<'a> View<'a> {
             let residual = value - fit.gain * before - fit.offset;
             let ratio = (residual / self.scale).powi(2);
             cost += ratio / (1.0 + ratio);
-            let weight = 1.0 / ((1.0 + ratio) * (1.0 + ratio));
+            let weight = geman_mcclure(ratio);
             let by_rotation = gradient(self.previous, sample.x, sample.y) * sample.by_rotation * fit.gain;
             let row = Vector5::new(by_rotation[0], by_rotation[1], by_rotation[2], before, 1.0);
             normal += row * row.transpose() * weight;
             right += row * (weight * residual);
         }
-        let worth = INDEPENDENT_SAMPLES / self.samples.len().max(1) as f64;
-        cost *= worth;
-        let unit = worth / (self.scale * self.scale);
+        let independent = INDEPENDENT_SAMPLES / self.samples.len().max(1) as f64;
+        cost *= independent;
+        let unit = independent / (self.scale * self.scale);
         normal *= unit;
         right *= unit;
         if let Some((expected, information)) = &self.prior {
             let error = so3::log(&(fit.rotation * expected.inverse()));
             cost += error.dot(&(information * error));
             let rotation = fit.rotation.to_rotation_matrix().into_inner();
-            let pull: Vector3<f64> = rotation.transpose() * (information * error);
+            let prior_gradient: Vector3<f64> = rotation.transpose() * (information * error);
             let mut corner = normal.fixed_view_mut::<3, 3>(0, 0);
             corner += rotation.transpose() * information * rotation;
             let mut top = right.fixed_rows_mut::<3>(0);
-            top += pull;
+            top += prior_gradient;
         }
         damp(&mut normal, 1e-6);
         let step = normal.cholesky().map(|factor| factor.solve(&right));

@@ -47,33 +47,24 @@ pub enum FrontEndError {
         width: usize,
         /// Rows of the image.
         height: usize,
-        /// Number of pixels.
+        /// Number of pixels that the image has.
         pixels: usize,
     },
 }
 
-/// A tracked feature in the previous image.
+/// A feature of the newest image.
 #[derive(Clone, Debug)]
-struct PreviousFeature {
-    id: FeatureId,
-    age: u32,
-    uv_px: Vector2<f64>,
-    bearing: Vector3<f64>,
+struct Track {
+    feature: TrackedFeature,
     /// Window of the feature; `None` if it was too near to the border or had no texture.
     reference: Option<ReferencePatch>,
 }
 
-/// A feature found in the current image.
+/// A feature of the previous image found in the current one.
 #[derive(Clone, Debug)]
-struct Step {
-    /// In the previous image.
-    id: FeatureId,
-    age: u32,
-    previous_uv_px: Vector2<f64>,
-    previous_bearing: Vector3<f64>,
-    /// In the current image.
-    uv_px: Vector2<f64>,
-    bearing: Vector3<f64>,
+struct Match {
+    previous: TrackedFeature,
+    now: TrackedFeature,
     reference: Option<ReferencePatch>,
 }
 
@@ -92,7 +83,7 @@ pub struct FrontEnd {
     options: FrontEndOptions,
     previous: Pyramid,
     now: Pyramid,
-    tracks: Vec<PreviousFeature>,
+    tracks: Vec<Track>,
     next_id: u64,
     coarse: CoarseAligner,
     detector: CornerDetector,
@@ -157,36 +148,24 @@ impl FrontEnd {
         let before = self.tracks.len();
         let expected = self.coarse.search_rotation(&self.previous, &self.now, predicted);
         let rows = predicted.and_then(|predicted| predicted.rows);
-        let steps = self.follow(expected.as_ref(), rows.as_ref());
-        statistics.lost = before - steps.len();
-        let (steps, motion) = self.reject(steps, expected.as_ref(), predicted);
-        let steps = self.correct_perspective(steps, &motion.rotation);
-        let steps = self.thin_out(steps);
-        statistics.tracked = steps.len();
-        statistics.rejected = before - statistics.lost - steps.len();
+        let matches = self.track_all(expected.as_ref(), rows.as_ref());
+        statistics.lost = before - matches.len();
+        let (matches, motion) = self.reject_outliers(matches, expected.as_ref(), predicted);
+        let matches = self.correct_perspective(matches, &motion.rotation);
+        let matches = self.remove_crowded(matches);
+        statistics.tracked = matches.len();
+        statistics.rejected = before - statistics.lost - matches.len();
         statistics.median_flow_px =
-            median(steps.iter().map(|step| (step.uv_px - step.previous_uv_px).norm())).unwrap_or(0.0);
-        statistics.mean_parallax_px = self.mean_parallax_px(&steps, &motion.rotation, rows.as_ref());
+            median(matches.iter().map(|found| (found.now.uv_px - found.previous.uv_px).norm())).unwrap_or(0.0);
+        statistics.mean_parallax_px = self.mean_parallax_px(&matches, &motion.rotation, rows.as_ref());
 
-        let mut features: Vec<TrackedFeature> = steps
-            .iter()
-            .map(|step| TrackedFeature {
-                id: step.id,
-                age: step.age + 1,
-                uv_px: step.uv_px,
-                previous_uv_px: Some(step.previous_uv_px),
-                bearing: step.bearing,
-            })
-            .collect();
+        let mut features: Vec<TrackedFeature> = matches.iter().map(|found| found.now).collect();
         self.detect(image, &mut features);
-        statistics.detected = features.len() - steps.len();
-        let references = steps.into_iter().map(|step| step.reference).chain(std::iter::repeat(None));
+        statistics.detected = features.len() - matches.len();
+        let references = matches.into_iter().map(|found| found.reference).chain(std::iter::repeat(None));
         self.tracks.clear();
-        self.tracks.extend(features.iter().zip(references).map(|(feature, reference)| PreviousFeature {
-            id: feature.id,
-            age: feature.age,
-            uv_px: feature.uv_px,
-            bearing: feature.bearing,
+        self.tracks.extend(features.iter().zip(references).map(|(feature, reference)| Track {
+            feature: *feature,
             reference:
                 reference.or_else(|| ReferencePatch::cut(image, &self.camera, &feature.uv_px, &Vector2::zeros())),
         }));
@@ -207,16 +186,16 @@ impl FrontEnd {
     }
 
     /// Tracks every feature from its predicted position, then the lost ones from the motion of the tracked ones.
-    fn follow(&self, expected: Option<&UnitQuaternion<f64>>, rows: Option<&RowRotations>) -> Vec<Step> {
+    fn track_all(&self, expected: Option<&UnitQuaternion<f64>>, rows: Option<&RowRotations>) -> Vec<Match> {
         let guesses: Vec<Vector2<f64>> = self
             .tracks
             .iter()
-            .map(|track| expected.map_or(track.uv_px, |rotation| self.rotated(track, rotation, rows)))
+            .map(|track| expected.map_or(track.feature.uv_px, |rotation| self.rotated(&track.feature, rotation, rows)))
             .collect();
         let mut buffers = Buffers { motion: lucas_kanade::Buffers::new(), search: ReferenceSearch::new() };
-        let mut results: Vec<Option<Step>> =
+        let mut results: Vec<Option<Match>> =
             self.tracks.iter().zip(&guesses).map(|(track, guess)| self.track(track, guess, &mut buffers)).collect();
-        let found: Vec<BearingPair> = results.iter().flatten().map(|step| self.pair_of(step, rows)).collect();
+        let found: Vec<BearingPair> = results.iter().flatten().map(|found| self.pair_of(found, rows)).collect();
         let lost = results.len() - found.len();
         if lost > 0 {
             let start = expected.copied().unwrap_or_else(UnitQuaternion::identity);
@@ -226,8 +205,8 @@ impl FrontEnd {
             let start_over = 2 * lost > results.len();
             for ((track, guess), result) in self.tracks.iter().zip(&guesses).zip(&mut results) {
                 let others = [
-                    observed.as_ref().map(|rotation| self.rotated(track, rotation, rows)),
-                    start_over.then_some(track.uv_px),
+                    observed.as_ref().map(|rotation| self.rotated(&track.feature, rotation, rows)),
+                    start_over.then_some(track.feature.uv_px),
                 ];
                 for other in others.into_iter().flatten() {
                     if result.is_none() && (other - guess).norm() > DIFFERENT_GUESS_PX {
@@ -239,15 +218,16 @@ impl FrontEnd {
         results.into_iter().flatten().collect()
     }
 
-    fn track(&self, track: &PreviousFeature, guess_px: &Vector2<f64>, buffers: &mut Buffers) -> Option<Step> {
+    /// Tracks one feature from a guess: on the coarse levels, then by its reference patch or, without a match, on the
+    /// finest level.
+    fn track(&self, track: &Track, guess_px: &Vector2<f64>, buffers: &mut Buffers) -> Option<Match> {
         let options = &self.options.lucas_kanade;
         let Buffers { motion, search } = buffers;
-        let near_px = lucas_kanade::approach(&self.previous, &self.now, &track.uv_px, guess_px, options, motion)?;
+        let from_px = track.feature.uv_px;
+        let near_px =
+            lucas_kanade::track_on_coarse_levels(&self.previous, &self.now, &from_px, guess_px, options, motion)?;
         let (previous, now) = (self.previous.levels().first()?, self.now.levels().first()?);
-        let renewed = || {
-            let motion_px = near_px - track.uv_px;
-            ReferencePatch::cut(previous, &self.camera, &track.uv_px, &motion_px)
-        };
+        let renewed = || ReferencePatch::cut(previous, &self.camera, &from_px, &(near_px - from_px));
         let mut matched = |mut reference: ReferencePatch| {
             let uv_px = reference.find(now, &near_px, &self.options.reference, search)?;
             Some((uv_px, Some(reference)))
@@ -255,38 +235,35 @@ impl FrontEnd {
         let known = track.reference.clone().and_then(&mut matched);
         let (uv_px, reference) = match known.or_else(|| renewed().and_then(matched)) {
             Some(found) => found,
-            None => (lucas_kanade::arrive(&self.previous, &self.now, &track.uv_px, &near_px, options, motion)?, None),
+            None => {
+                let (previous, now) = (&self.previous, &self.now);
+                (lucas_kanade::track_on_finest_level(previous, now, &from_px, &near_px, options, motion)?, None)
+            }
         };
         if self.mask.as_ref().is_some_and(|mask| mask.covers(&uv_px)) {
             return None;
         }
         let bearing = self.camera.unproject(&uv_px)?;
-        Some(Step {
-            id: track.id,
-            age: track.age,
-            previous_uv_px: track.uv_px,
-            previous_bearing: track.bearing,
-            uv_px,
-            bearing,
-            reference,
-        })
+        let TrackedFeature { id, age, .. } = track.feature;
+        let now = TrackedFeature { id, age: age + 1, uv_px, previous_uv_px: Some(from_px), bearing };
+        Some(Match { previous: track.feature, now, reference })
     }
 
     /// Pixel of a feature under a rotation of the camera alone; its previous pixel when that is out of view.
     fn rotated(
         &self,
-        track: &PreviousFeature,
+        feature: &TrackedFeature,
         rotation: &UnitQuaternion<f64>,
         rows: Option<&RowRotations>,
     ) -> Vector2<f64> {
         let rotated_px = match rows {
-            None => self.camera.project(&(rotation * track.bearing)),
+            None => self.camera.project(&(rotation * feature.bearing)),
             Some(rows) => {
-                let middle = RowRotations::to_middle(&rows.previous_rad, self.row(&track.uv_px), &track.bearing);
+                let middle = RowRotations::to_middle(&rows.previous_rad, self.row(&feature.uv_px), &feature.bearing);
                 self.at_its_row(&(rotation * middle), &rows.now_rad)
             }
         };
-        rotated_px.filter(|uv_px| self.camera.contains(uv_px, 0.0)).unwrap_or(track.uv_px)
+        rotated_px.filter(|uv_px| self.camera.contains(uv_px, 0.0)).unwrap_or(feature.uv_px)
     }
 
     /// Row of a pixel as a ratio of the image's height.
@@ -305,60 +282,57 @@ impl FrontEnd {
     }
 
     /// Bearings of a feature in both images; for a rolling shutter, in the cameras at the middle rows.
-    fn pair_of(&self, step: &Step, rows: Option<&RowRotations>) -> BearingPair {
-        let Some(rows) = rows else { return BearingPair { previous: step.previous_bearing, now: step.bearing } };
+    fn pair_of(&self, found: &Match, rows: Option<&RowRotations>) -> BearingPair {
+        let Match { previous, now, .. } = found;
+        let Some(rows) = rows else { return BearingPair { previous: previous.bearing, now: now.bearing } };
         BearingPair {
-            previous: RowRotations::to_middle(
-                &rows.previous_rad,
-                self.row(&step.previous_uv_px),
-                &step.previous_bearing,
-            ),
-            now: RowRotations::to_middle(&rows.now_rad, self.row(&step.uv_px), &step.bearing),
+            previous: RowRotations::to_middle(&rows.previous_rad, self.row(&previous.uv_px), &previous.bearing),
+            now: RowRotations::to_middle(&rows.now_rad, self.row(&now.uv_px), &now.bearing),
         }
     }
 
     /// Rejects features that do not move with the scene.
-    fn reject(
+    fn reject_outliers(
         &self,
-        steps: Vec<Step>,
+        matches: Vec<Match>,
         expected: Option<&UnitQuaternion<f64>>,
         predicted: Option<&PredictedRotation>,
-    ) -> (Vec<Step>, ImageMotion) {
+    ) -> (Vec<Match>, ImageMotion) {
         let rows = predicted.and_then(|predicted| predicted.rows);
-        let pairs: Vec<BearingPair> = steps.iter().map(|step| self.pair_of(step, rows.as_ref())).collect();
+        let pairs: Vec<BearingPair> = matches.iter().map(|found| self.pair_of(found, rows.as_ref())).collect();
         let start = expected.copied().unwrap_or_else(UnitQuaternion::identity);
         let focal_px = self.camera.focal_length_px();
         let motion = outliers::estimate_motion(&pairs, &start, predicted, focal_px, &self.options.outliers);
-        let kept = steps.into_iter().zip(&motion.is_inlier).filter_map(|(step, inlier)| inlier.then_some(step));
+        let kept = matches.into_iter().zip(&motion.is_inlier).filter_map(|(found, inlier)| inlier.then_some(found));
         (kept.collect(), motion)
     }
 
     /// Removes the errors of the matches that are caused by perspective.
-    fn correct_perspective(&self, mut steps: Vec<Step>, rotation: &UnitQuaternion<f64>) -> Vec<Step> {
-        for step in &mut steps {
-            let Some(reference) = &mut step.reference else { continue };
-            let uv_px = step.uv_px - reference.perspective_error_px(&self.camera, rotation, &step.bearing);
+    fn correct_perspective(&self, mut matches: Vec<Match>, rotation: &UnitQuaternion<f64>) -> Vec<Match> {
+        for Match { now, reference, .. } in &mut matches {
+            let Some(reference) = reference else { continue };
+            let uv_px = now.uv_px - reference.perspective_error_px(&self.camera, rotation, &now.bearing);
             if let Some(bearing) = self.camera.unproject(&uv_px) {
-                (step.uv_px, step.bearing) = (uv_px, bearing);
+                (now.uv_px, now.bearing) = (uv_px, bearing);
             }
         }
-        steps
+        matches
     }
 
     /// Keeps the longest of tracks that are too near to each other.
-    fn thin_out(&mut self, mut steps: Vec<Step>) -> Vec<Step> {
+    fn remove_crowded(&mut self, mut matches: Vec<Match>) -> Vec<Match> {
         let [width, height] = self.camera.resolution_px;
         self.crowd.reset(width, height, CROWDED_RATIO * self.options.corners.min_distance_px);
-        steps.sort_by_key(|step| (std::cmp::Reverse(step.age), step.id));
-        steps.retain(|step| {
-            let free = self.crowd.is_free(&step.uv_px);
+        matches.sort_by_key(|found| (std::cmp::Reverse(found.now.age), found.now.id));
+        matches.retain(|found| {
+            let free = self.crowd.is_free(&found.now.uv_px);
             if free {
-                self.crowd.insert(step.uv_px);
+                self.crowd.insert(found.now.uv_px);
             }
             free
         });
-        steps.sort_by_key(|step| step.id);
-        steps
+        matches.sort_by_key(|found| found.now.id);
+        matches
     }
 
     fn detect(&mut self, image: &GrayImage, features: &mut Vec<TrackedFeature>) {
@@ -373,15 +347,15 @@ impl FrontEnd {
         }
     }
 
-    fn mean_parallax_px(&self, steps: &[Step], rotation: &UnitQuaternion<f64>, rows: Option<&RowRotations>) -> f64 {
+    fn mean_parallax_px(&self, matches: &[Match], rotation: &UnitQuaternion<f64>, rows: Option<&RowRotations>) -> f64 {
         let (mut sum, mut count) = (0.0, 0);
-        for step in steps {
+        for found in matches {
             let rotated_px = match rows {
-                None => self.camera.project(&(rotation * step.previous_bearing)),
-                Some(rows) => self.at_its_row(&(rotation * self.pair_of(step, Some(rows)).previous), &rows.now_rad),
+                None => self.camera.project(&(rotation * found.previous.bearing)),
+                Some(rows) => self.at_its_row(&(rotation * self.pair_of(found, Some(rows)).previous), &rows.now_rad),
             };
             if let Some(rotated_px) = rotated_px {
-                sum += (step.uv_px - rotated_px).norm();
+                sum += (found.now.uv_px - rotated_px).norm();
                 count += 1;
             }
         }

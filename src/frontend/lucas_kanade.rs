@@ -1,4 +1,21 @@
 //! Tracking of points from one image to the next: pyramidal Lucas–Kanade.
+//!
+//! Lucas and Kanade ("An iterative image registration technique with an application to stereo vision", IJCAI 1981) find
+//! the shift `d` of a window `T` of the first image in the second image `J` by Gauss–Newton; from the coarsest level of
+//! an image pyramid to the finest as in Bouguet ("Pyramidal implementation of the Lucas Kanade feature tracker", 2000).
+//! The gradient is taken from the window and not from the second image, so that it is computed once for all iterations
+//! (inverse compositional: Baker and Matthews, "Lucas–Kanade 20 years on", IJCV 2004).
+//!
+//! The brightness may change by a gain `a` and an offset `b`, which are eliminated:
+//!
+//! ```text
+//! min over d, a, b   Σ (J(x + d) − a T(x) − b)²
+//! g' = ∇T − (means of ∇T) − (regression of ∇T on T)        ∇T without its projection on 1 and T
+//! r(d) = Σ g' J(x + d) = 0        H = Σ g' g'ᵀ        d ← d − H⁻¹ r(d)
+//! ```
+//!
+//! A track is rejected if tracking back from its end misses its start (forward–backward error: Kalal, Mikolajczyk and
+//! Matas, "Forward-backward error", ICPR 2010).
 
 #![expect(clippy::inline_always, reason = "code not inlined is not compiled for the registers of its caller")]
 
@@ -7,17 +24,15 @@ use std::ops::Range;
 use nalgebra::Vector2;
 use pulp::{Arch, NullaryFnOnce};
 
-use super::products::{STRIDE, WINDOW, Weights, sums_of_products};
+use super::filters::{
+    self, LANES, REGISTER, WINDOW, cubic_slopes, cubic_weights, larger, rounded_bits, scharr, smaller_eigenvalue,
+};
+use super::products::{STRIDE, Weights, sums_of_products};
 use super::pyramid::{Pyramid, cut_out};
 use crate::geometry::planar_length;
 use crate::sensors::GrayImage;
 
-/// Columns of the window, padded to whole vector registers; the padding has zero weight.
-const LANES: usize = 24;
-/// Columns in a vector register.
-pub(super) const REGISTER: usize = 8;
-/// Distance of the centre from the first column or row of the window.
-const CENTRE: f32 = (WINDOW / 2) as f32;
+const CENTRE: f32 = filters::CENTRE as f32;
 /// Rows of the region of the second image, so that the window can move within it.
 const SEARCH_HEIGHT: usize = 34;
 /// Largest first column and row of a window for which the neighbouring windows at one and two pixels also fit.
@@ -59,18 +74,16 @@ impl Default for LucasKanadeOptions {
     }
 }
 
-/// Gradient of the window in the first image, with gain and offset of the brightness eliminated.
+/// Gradient `g'` of the window in the first image, with gain and offset of the brightness eliminated, so that
+/// `Σ g' T = 0` and `Σ g' = 0`.
 ///
-/// With `T` the window of the first image, `g` its gradient and `J` the second image, the shift `d` satisfies
-/// `Σ g'·J(x + d) = 0`, where `g'` is `g` minus its projection on `1` and `T`.
-/// This `d` is the least-squares solution with gain and offset eliminated, and `Σ g'·T = 0`.
-/// As `J(x + d)` is interpolated, the sum is a polynomial in the fraction of `d` whose coefficients are sums over whole
+/// As `J(x + d)` is interpolated, `r(d)` is a polynomial in the fraction of `d` whose coefficients are sums over whole
 /// pixels: iterations within one pixel cost nothing, and the sums are exact in integers.
 #[derive(Clone, Debug)]
 struct Template {
     x: Weights,
     y: Weights,
-    /// `Σ g'·gᵀ` as `xx, xy, yy`, in the unit of the weights times grey levels per pixel.
+    /// `H = Σ g' g'ᵀ` as `xx, xy, yy`, in the unit of the weights times grey levels per pixel.
     hessian: [f32; 3],
 }
 
@@ -99,39 +112,6 @@ impl Buffers {
     }
 }
 
-/// The larger value, by the comparison of vector units.
-#[inline(always)]
-pub(super) fn larger(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
-}
-
-/// Smaller eigenvalue of the symmetric 2 × 2 matrix `[xx, xy, yy]`.
-#[inline(always)]
-pub(super) fn smaller_eigenvalue([xx, xy, yy]: [f32; 3]) -> f32 {
-    0.5 * (xx + yy) - planar_length([0.5 * (xx - yy), xy])
-}
-
-/// Weights of the four pixels around a point at `t` after the second one, by Keys' cubic convolution.
-#[inline(always)]
-fn cubic_weights(t: f32) -> [f32; 4] {
-    [
-        ((2.0 - t) * t - 1.0) * t * 0.5,
-        ((3.0 * t - 5.0) * t * t + 2.0) * 0.5,
-        ((4.0 - 3.0 * t) * t + 1.0) * t * 0.5,
-        (t - 1.0) * t * t * 0.5,
-    ]
-}
-
-/// Derivative of [`cubic_weights`] by `t`.
-fn cubic_slopes(t: f32) -> [f32; 4] {
-    [
-        ((4.0 - 3.0 * t) * t - 1.0) * 0.5,
-        (9.0 * t - 10.0) * t * 0.5,
-        ((8.0 - 9.0 * t) * t + 1.0) * 0.5,
-        (3.0 * t - 2.0) * t * 0.5,
-    ]
-}
-
 fn linear_weights(t: f32) -> [f32; 2] {
     [1.0 - t, t]
 }
@@ -150,13 +130,13 @@ type Patch = [[f32; PATCH_WIDTH]; PATCH_HEIGHT];
 impl Buffers {
     /// Computes the template of the window of `image` around `at`, without the pixels that are outside the image or
     /// outside when moved to `guess`. Returns true if enough of the window remains for tracking.
-    fn fill(&mut self, image: &GrayImage, at: [f32; 2], guess: [f32; 2], options: &LucasKanadeOptions) -> bool {
-        Arch::new().dispatch(Filling { buffers: self, image, at, guess, options })
+    fn set_template(&mut self, image: &GrayImage, at: [f32; 2], guess: [f32; 2], options: &LucasKanadeOptions) -> bool {
+        Arch::new().dispatch(TemplatePreparation { buffers: self, image, at, guess, options })
     }
 }
 
-/// [`Buffers::fill`], compiled for every width of vector registers.
-struct Filling<'a> {
+/// [`Buffers::set_template`], compiled for every width of vector registers.
+struct TemplatePreparation<'a> {
     buffers: &'a mut Buffers,
     image: &'a GrayImage,
     at: [f32; 2],
@@ -164,7 +144,7 @@ struct Filling<'a> {
     options: &'a LucasKanadeOptions,
 }
 
-impl NullaryFnOnce for Filling<'_> {
+impl NullaryFnOnce for TemplatePreparation<'_> {
     type Output = bool;
 
     #[inline(always)]
@@ -190,7 +170,7 @@ impl NullaryFnOnce for Filling<'_> {
         let scale = if variance > 1e-3 { 1.0 / variance } else { 0.0 };
         let slopes = [(x_value - x * value) * scale, (y_value - y * value) * scale];
         let offsets = [x - slopes[0] * value, y - slopes[1] * value];
-        let ([xx, xy, yy], largest) = free_of_brightness(patch, rows, &mask, offsets, slopes, gradient);
+        let ([xx, xy, yy], largest) = project_out_brightness(patch, rows, &mask, offsets, slopes, gradient);
         let hessian = [xx, xy, yy];
         if smaller_eigenvalue(hessian) <= options.min_eigenvalue as f32 * area {
             return false;
@@ -200,7 +180,7 @@ impl NullaryFnOnce for Filling<'_> {
         for (weights, axis) in [(&mut template.x, 0), (&mut template.y, 1)] {
             for (line, gradient) in weights.as_chunks_mut::<STRIDE>().0.iter_mut().zip(gradient.iter()) {
                 for c in 0..LANES {
-                    line[c] = rounded(unit * gradient[axis][c]);
+                    line[c] = rounded_bits(unit * gradient[axis][c]) as i16;
                 }
             }
         }
@@ -224,15 +204,11 @@ fn differentiate(patch: &Patch, rows: Range<usize>, mask: &[f32; LANES], gradien
     for first in (0..LANES).step_by(REGISTER) {
         let mut sums = [[0.0_f32; REGISTER]; 6];
         for row in rows.clone() {
-            let (above, here, below) = (&patch[row], &patch[row + 1], &patch[row + 2]);
+            let rows = [&patch[row], &patch[row + 1], &patch[row + 2]];
             for lane in 0..REGISTER {
                 let c = first + lane;
-                // Scharr's derivative.
-                let x = 3.0 * (above[c + 2] - above[c] + below[c + 2] - below[c]) + 10.0 * (here[c + 2] - here[c]);
-                let y =
-                    3.0 * (below[c] - above[c] + below[c + 2] - above[c + 2]) + 10.0 * (below[c + 1] - above[c + 1]);
-                let (x, y) = (x * mask[c] * (1.0 / 32.0), y * mask[c] * (1.0 / 32.0));
-                let value = here[c + 1] * mask[c];
+                let [x, y] = scharr(rows, c).map(|slope| slope * mask[c] * (1.0 / 32.0));
+                let value = rows[1][c + 1] * mask[c];
                 sums[0][lane] += value;
                 sums[1][lane] += value * value;
                 sums[2][lane] += x;
@@ -250,9 +226,10 @@ fn differentiate(patch: &Patch, rows: Range<usize>, mask: &[f32; LANES], gradien
     all.map(|lanes| lanes.iter().sum())
 }
 
-/// Subtracts `offsets + slopes·T` from the gradient; returns its sums of products `xx, xy, yy` and its largest entry.
+/// Subtracts `offsets + slopes·T` from the gradient `∇T`, which leaves `g'`; returns `H` as `xx, xy, yy` and the largest
+/// entry of `g'`.
 #[inline(always)]
-fn free_of_brightness(
+fn project_out_brightness(
     patch: &Patch,
     rows: Range<usize>,
     mask: &[f32; LANES],
@@ -281,7 +258,7 @@ fn free_of_brightness(
 }
 
 impl Template {
-    /// Adds up `Σ g'·J` for the window whose first pixel is `(column, row)` of `search` and its neighbours to the right,
+    /// Returns `Σ g' J` for the window whose first pixel is `(column, row)` of `search` and its neighbours to the right,
     /// below and both; `[dy][dx]` are the sums with the x and the y component of `g'`.
     fn correlate(&self, search: &Search, column: usize, row: usize) -> [[[f32; 2]; 2]; 2] {
         let pixels = search.as_flattened()[row * STRIDE + column..].first_chunk();
@@ -290,13 +267,6 @@ impl Template {
             sums_of_products([&self.x, &self.y], pixels).map(|sums| sums.map(|sum| sum as f32));
         [[here, right], [below, both]]
     }
-}
-
-/// Nearest integer of a value far below 2²²: adding 1.5·2²³ leaves it in the low bits, where vector units read it
-/// faster than through a checked conversion.
-#[inline(always)]
-fn rounded(value: f32) -> i16 {
-    (value + 12_582_912.0).to_bits() as i16
 }
 
 /// Largest integer not above `value`, which must fit into an `i32`.
@@ -338,32 +308,33 @@ fn interpolate(
     }
 }
 
-/// Value of `Σ g'·J(x + d)` and its derivative by `d`, from its coefficients and the weights of the fraction of `d`.
-fn balance<const N: usize>(
+/// `r(d)` (2) and its derivative by `d` (2 × 2), from the coefficients and the weights of the fraction of `d`.
+fn residual_and_jacobian<const N: usize>(
     sums: &[[[f32; 2]; N]; N],
     along: ([f32; N], [f32; N]),
     down: ([f32; N], [f32; N]),
 ) -> ([f32; 2], [[f32; 2]; 2]) {
-    let (mut value, mut slope) = ([0.0; 2], [[0.0; 2]; 2]);
+    let (mut residual, mut jacobian) = ([0.0; 2], [[0.0; 2]; 2]);
     for (j, line) in sums.iter().enumerate() {
         for (i, point) in line.iter().enumerate() {
             for k in 0..2 {
-                value[k] += down.0[j] * along.0[i] * point[k];
-                slope[k][0] += down.0[j] * along.1[i] * point[k];
-                slope[k][1] += down.1[j] * along.0[i] * point[k];
+                residual[k] += down.0[j] * along.0[i] * point[k];
+                jacobian[k][0] += down.0[j] * along.1[i] * point[k];
+                jacobian[k][1] += down.1[j] * along.0[i] * point[k];
             }
         }
     }
-    (value, slope)
+    (residual, jacobian)
 }
 
-/// Step towards `value` = 0: Newton's, or the Gauss–Newton step if the two matrices differ too much.
-fn step_to_balance(value: [f32; 2], slope: [[f32; 2]; 2], [xx, xy, yy]: [f32; 3]) -> [f32; 2] {
-    let determinant = xx * yy - xy * xy;
-    let newton = slope[0][0] * slope[1][1] - slope[0][1] * slope[1][0];
-    let sound = slope[0][0] > 0.3 * xx && slope[1][1] > 0.3 * yy && newton > 0.1 * determinant;
-    let ([[a, b], [c, d]], determinant) = if sound { (slope, newton) } else { ([[xx, xy], [xy, yy]], determinant) };
-    [-(d * value[0] - b * value[1]) / determinant, -(a * value[1] - c * value[0]) / determinant]
+/// Newton's step on `r(d) = 0`, or the Gauss–Newton step `−H⁻¹ r` if the Jacobian of `r` and `H` differ too much.
+fn newton_step(r: [f32; 2], jacobian: [[f32; 2]; 2], [xx, xy, yy]: [f32; 3]) -> [f32; 2] {
+    let hessian_determinant = xx * yy - xy * xy;
+    let determinant = jacobian[0][0] * jacobian[1][1] - jacobian[0][1] * jacobian[1][0];
+    let is_similar = jacobian[0][0] > 0.3 * xx && jacobian[1][1] > 0.3 * yy && determinant > 0.1 * hessian_determinant;
+    let ([[a, b], [c, d]], determinant) =
+        if is_similar { (jacobian, determinant) } else { ([[xx, xy], [xy, yy]], hessian_determinant) };
+    [-(d * r[0] - b * r[1]) / determinant, -(a * r[1] - c * r[0]) / determinant]
 }
 
 /// Largest distance of a fraction outside its pixel before the sums are recomputed; prevents oscillation at a pixel
@@ -378,7 +349,7 @@ const LONGEST_STEP_PX: f32 = 6.0;
 type Taps<const N: usize> = (fn(f32) -> [f32; N], fn(f32) -> [f32; N]);
 
 /// Iterates within one pixel; returns the fraction of `d`, and true if the last step was shorter than `epsilon`.
-fn settle<const N: usize>(
+fn iterate_within_pixel<const N: usize>(
     sums: &[[[f32; 2]; N]; N],
     kernel: Taps<N>,
     mut fraction: [f32; 2],
@@ -387,8 +358,8 @@ fn settle<const N: usize>(
 ) -> ([f32; 2], bool) {
     for _ in 0..MAX_ITERATIONS {
         let [along, down] = fraction.map(|t| (kernel.0(t), kernel.1(t)));
-        let (value, slope) = balance(sums, along, down);
-        let [x, y] = step_to_balance(value, slope, hessian);
+        let (residual, jacobian) = residual_and_jacobian(sums, along, down);
+        let [x, y] = newton_step(residual, jacobian, hessian);
         let length = planar_length([x, y]);
         let shrink = if length > LONGEST_STEP_PX { LONGEST_STEP_PX / length } else { 1.0 };
         fraction = [fraction[0] + shrink * x, fraction[1] + shrink * y];
@@ -402,12 +373,12 @@ fn settle<const N: usize>(
     (fraction, true)
 }
 
-/// Interpolation of the second image.
+/// Interpolation of the second image along each axis.
 #[derive(Clone, Copy, PartialEq)]
 enum Kernel {
-    /// Two pixels.
+    /// Between the two nearest pixels.
     Linear,
-    /// Four pixels, for the last stage.
+    /// Cubic convolution of four pixels, for the last stage.
     Cubic,
 }
 
@@ -428,61 +399,8 @@ impl NullaryFnOnce for Cutting<'_> {
 }
 
 /// True if a position is finite and small enough for integer pixels.
-fn is_sane(at: [f32; 2]) -> bool {
+fn is_in_range(at: [f32; 2]) -> bool {
     at.iter().all(|t| t.abs() < 1e5)
-}
-
-/// Iterates `at` until `Σ g'·J` vanishes for the window of `image` around it; `None` without convergence.
-fn seek(
-    template: &Template,
-    search: &mut Search,
-    image: &GrayImage,
-    mut at: [f32; 2],
-    kernel: Kernel,
-    options: &LucasKanadeOptions,
-) -> Option<[f32; 2]> {
-    // First pixel of the region.
-    let mut origin: Option<[i32; 2]> = None;
-    let epsilon = options.epsilon_px as f32;
-    for _ in 0..options.max_moves {
-        if !is_sane(at) {
-            return None;
-        }
-        let first = at.map(|t| floor(t - CENTRE));
-        let cell = first.map(|t| t as f32);
-        let fits = |[left, top]: [i32; 2]| {
-            (1..=LAST_COLUMN).contains(&(first[0] - left)) && (1..=LAST_ROW).contains(&(first[1] - top))
-        };
-        let [left, top] = origin.filter(|corner| fits(*corner)).unwrap_or_else(|| {
-            let corner = [first[0] - LAST_COLUMN / 2, first[1] - LAST_ROW / 2];
-            Arch::new().dispatch(Cutting { image, corner, search });
-            corner
-        });
-        origin = Some([left, top]);
-        let (column, row) = ((first[0] - left) as usize, (first[1] - top) as usize);
-        let fraction = [at[0] - CENTRE - cell[0], at[1] - CENTRE - cell[1]];
-        let (fraction, rests) = match kernel {
-            Kernel::Linear => {
-                let sums = template.correlate(search, column, row);
-                settle(&sums, (linear_weights, |_| [-1.0, 1.0]), fraction, template.hessian, epsilon)
-            }
-            Kernel::Cubic => {
-                let mut sums = [[[0.0; 2]; 4]; 4];
-                for (j, i) in [(0, 0), (0, 2), (2, 0), (2, 2)] {
-                    let block = template.correlate(search, column + i - 1, row + j - 1);
-                    for (dj, line) in block.iter().enumerate() {
-                        sums[j + dj][i..i + 2].copy_from_slice(line);
-                    }
-                }
-                settle(&sums, (cubic_weights, cubic_slopes), fraction, template.hessian, 0.1 * epsilon)
-            }
-        };
-        at = [cell[0] + fraction[0] + CENTRE, cell[1] + fraction[1] + CENTRE];
-        if rests {
-            return Some(at);
-        }
-    }
-    None
 }
 
 /// Tracks one point from one image to the next by pyramidal Lucas–Kanade with compensation of gain and offset.
@@ -498,15 +416,15 @@ pub fn track(
     options: &LucasKanadeOptions,
 ) -> Option<Vector2<f64>> {
     let mut buffers = Buffers::new();
-    let near_px = approach(previous, now, from_px, guess_px, options, &mut buffers)?;
-    arrive(previous, now, from_px, &near_px, options, &mut buffers)
+    let near_px = track_on_coarse_levels(previous, now, from_px, guess_px, options, &mut buffers)?;
+    track_on_finest_level(previous, now, from_px, &near_px, options, &mut buffers)
 }
 
 /// First stage of [`track`]: on the half-size levels, to about half a pixel.
 ///
 /// The window of a level is centred at the nearest whole pixel, which is assumed to move like the point.
 /// A level without texture keeps the guess; `None` only for positions that are not finite or too large.
-pub(super) fn approach(
+pub(super) fn track_on_coarse_levels(
     previous: &Pyramid,
     now: &Pyramid,
     from_px: &Vector2<f64>,
@@ -516,7 +434,7 @@ pub(super) fn approach(
 ) -> Option<Vector2<f64>> {
     let from = [from_px.x as f32, from_px.y as f32];
     let mut guess = [guess_px.x as f32, guess_px.y as f32];
-    if !is_sane(from) || !is_sane(guess) {
+    if !is_in_range(from) || !is_in_range(guess) {
         return None;
     }
     let levels = previous.levels().len().min(now.levels().len()).min(options.levels);
@@ -524,8 +442,8 @@ pub(super) fn approach(
         let scale = (0.5_f32).powi(level as i32);
         let at = from.map(|t| (t * scale).round());
         let start = [0, 1].map(|k| at[k] + (guess[k] - from[k]) * scale);
-        if buffers.fill(&previous.levels()[level], at, start, options)
-            && let Some(found) = buffers.seek(&now.levels()[level], start, Kernel::Linear, options)
+        if buffers.set_template(&previous.levels()[level], at, start, options)
+            && let Some(found) = buffers.align(&now.levels()[level], start, Kernel::Linear, options)
         {
             guess = [0, 1].map(|k| from[k] + (found[k] - at[k]) / scale);
         }
@@ -534,7 +452,7 @@ pub(super) fn approach(
 }
 
 /// Second stage of [`track`]: on the full-size images, forwards and backwards.
-pub(super) fn arrive(
+pub(super) fn track_on_finest_level(
     previous: &Pyramid,
     now: &Pyramid,
     from_px: &Vector2<f64>,
@@ -556,14 +474,64 @@ pub(super) fn arrive(
 }
 
 impl Buffers {
-    fn seek(
+    /// Iterates the shift of the template from `at` until `r(d)` vanishes; returns the centre of the window in `image`, or
+    /// `None` without convergence.
+    fn align(
         &mut self,
         image: &GrayImage,
-        at: [f32; 2],
+        mut at: [f32; 2],
         kernel: Kernel,
         options: &LucasKanadeOptions,
     ) -> Option<[f32; 2]> {
-        seek(&self.template, &mut self.search, image, at, kernel, options)
+        let Self { template, search, .. } = self;
+        // First pixel of the region.
+        let mut origin: Option<[i32; 2]> = None;
+        let epsilon = options.epsilon_px as f32;
+        for _ in 0..options.max_moves {
+            if !is_in_range(at) {
+                return None;
+            }
+            let first = at.map(|t| floor(t - CENTRE));
+            let cell = first.map(|t| t as f32);
+            let fits = |[left, top]: [i32; 2]| {
+                (1..=LAST_COLUMN).contains(&(first[0] - left)) && (1..=LAST_ROW).contains(&(first[1] - top))
+            };
+            let [left, top] = origin.filter(|corner| fits(*corner)).unwrap_or_else(|| {
+                let corner = [first[0] - LAST_COLUMN / 2, first[1] - LAST_ROW / 2];
+                Arch::new().dispatch(Cutting { image, corner, search });
+                corner
+            });
+            origin = Some([left, top]);
+            let (column, row) = ((first[0] - left) as usize, (first[1] - top) as usize);
+            let fraction = [at[0] - CENTRE - cell[0], at[1] - CENTRE - cell[1]];
+            let (fraction, has_converged) = match kernel {
+                Kernel::Linear => {
+                    let sums = template.correlate(search, column, row);
+                    iterate_within_pixel(&sums, (linear_weights, |_| [-1.0, 1.0]), fraction, template.hessian, epsilon)
+                }
+                Kernel::Cubic => {
+                    let mut sums = [[[0.0; 2]; 4]; 4];
+                    for (j, i) in [(0, 0), (0, 2), (2, 0), (2, 2)] {
+                        let block = template.correlate(search, column + i - 1, row + j - 1);
+                        for (dj, line) in block.iter().enumerate() {
+                            sums[j + dj][i..i + 2].copy_from_slice(line);
+                        }
+                    }
+                    iterate_within_pixel(
+                        &sums,
+                        (cubic_weights, cubic_slopes),
+                        fraction,
+                        template.hessian,
+                        0.1 * epsilon,
+                    )
+                }
+            };
+            at = [cell[0] + fraction[0] + CENTRE, cell[1] + fraction[1] + CENTRE];
+            if has_converged {
+                return Some(at);
+            }
+        }
+        None
     }
 
     /// Last stage of [`track`], on the full-size image.
@@ -575,11 +543,11 @@ impl Buffers {
         guess: [f32; 2],
         options: &LucasKanadeOptions,
     ) -> Option<[f32; 2]> {
-        if !self.fill(previous, from, guess, options) {
+        if !self.set_template(previous, from, guess, options) {
             return None;
         }
-        let near = self.seek(now, guess, Kernel::Linear, options)?;
-        let [x, y] = self.seek(now, near, Kernel::Cubic, options)?;
+        let near = self.align(now, guess, Kernel::Linear, options)?;
+        let [x, y] = self.align(now, near, Kernel::Cubic, options)?;
         let inside = x >= 0.0 && y >= 0.0 && x <= (now.width - 1) as f32 && y <= (now.height - 1) as f32;
         inside.then_some([x, y])
     }

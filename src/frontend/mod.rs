@@ -5,11 +5,13 @@
 //!
 //! [`FrontEnd`] processes images in order. It predicts features by a [`PredictedRotation`] or, if that is inconsistent
 //! with the images, by aligning coarse images, tracks them by [`lucas_kanade`], refines them against reference patches
-//! ([`ReferenceOptions`]), rejects those that do not move with the scene ([`outliers`]), and adds new [`corners`].
+//! ([`ReferenceOptions`]), rejects the [`outliers`] of the epipolar geometry, and adds new [`corners`].
 
 mod appearance;
 mod coarse;
 pub mod corners;
+mod epipolar;
+mod filters;
 mod front_end;
 pub mod lucas_kanade;
 pub mod outliers;

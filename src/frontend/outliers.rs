@@ -1,19 +1,31 @@
-//! Rejection of features that do not move with the scene, by the epipolar geometry of two images.
+//! Rejection of features that do not move with the scene: RANSAC on the epipolar geometry of two images.
+//!
+//! RANSAC (Fischler and Bolles, "Random sample consensus", CACM 1981) solves for the motion of minimal random samples
+//! and keeps the hypothesis with the largest consensus. Here this is the one with the least truncated cost
+//! `Σ min(d²/s², 1)` over the distances `d` of all tracks (MSAC: Torr and Zisserman, "MLESAC", CVIU 2000), with a scale
+//! `s` that decreases from stage to stage.
+//!
+//! With a given rotation a minimal sample has two tracks: the normals `nᵢ = R fᵢ × f'ᵢ` of their epipolar planes are
+//! perpendicular to the translation, so that `t ∝ n₁ × n₂`. If no hypothesis fits, samples of five tracks, as many as the
+//! essential matrix has degrees of freedom (Nistér, "An efficient solution to the five-point relative pose problem",
+//! PAMI 2004), are solved by Gauss–Newton from the fitted rotation instead of by Nistér's polynomial.
 //!
 //! A predicted rotation is a prior only: a gyroscope has a bias, and a gimbal's chain may have an error of degrees.
 //! The rotation is estimated from the tracks, together with the direction of the translation.
 
-use nalgebra::{Const, Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
+use nalgebra::{Const, Matrix3, UnitQuaternion, Vector3};
 
+pub use super::epipolar::BearingPair;
+use super::epipolar::{MotionHypothesis, epipolar_distance, epipolar_distances, gauss_newton_step, geman_mcclure};
 use super::prediction::PredictedRotation;
-use crate::geometry::{median, so3, tangent_basis};
+use crate::geometry::{median, so3};
 use crate::optimization::{NormalEquations, gauss_newton};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OutlierOptions {
     /// Largest distance of an inlier from its epipolar line, in pixels at the image centre.
     pub threshold_px: f64,
-    /// Number of random pairs of features from which directions of translation are hypothesized, per stage and start.
+    /// Number of random samples of two tracks from which directions of translation are hypothesized, per stage and start.
     pub hypotheses: usize,
     /// With fewer tracks no track is rejected.
     pub min_tracks: usize,
@@ -21,7 +33,7 @@ pub struct OutlierOptions {
     pub min_inlier_ratio: f64,
     /// Standard deviation of an inlier's track, in pixels; weights a predicted rotation against the tracks.
     pub track_sigma_px: f64,
-    /// Seed of the random pairs; the same for every image.
+    /// Seed of the random samples; the same for every image.
     pub seed: u64,
 }
 
@@ -41,30 +53,13 @@ impl Default for OutlierOptions {
 /// Motion between two images, estimated from their tracks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImageMotion {
-    /// Rotation `camera_now_from_camera_previous`.
+    /// Rotation `R` of the epipolar geometry, `camera_now_from_camera_previous`.
     pub rotation: UnitQuaternion<f64>,
     /// Unit direction of the translation of points from the previous camera frame to the current one; `None` without
     /// parallax.
     pub direction: Option<Vector3<f64>>,
     /// True for each inlier track.
     pub is_inlier: Vec<bool>,
-}
-
-/// Unit directions of one feature in two images.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BearingPair {
-    /// In the previous camera frame.
-    pub previous: Vector3<f64>,
-    /// In the current camera frame.
-    pub now: Vector3<f64>,
-}
-
-/// Rotation and direction of translation with their cost.
-#[derive(Clone, Copy)]
-pub(super) struct MotionHypothesis {
-    pub(super) rotation: UnitQuaternion<f64>,
-    pub(super) direction: Vector3<f64>,
-    pub(super) cost: f64,
 }
 
 /// Estimates the motion between two images and its inliers.
@@ -84,8 +79,8 @@ pub fn estimate_motion(
         return ImageMotion { rotation, direction: None, is_inlier: vec![true; pairs.len()] };
     }
     let prior = RotationInformation::new(predicted, options.track_sigma_px / focal_px);
-    let mut search = Search { pairs, prior, options, dice: Dice(options.seed.max(1)), rotated: Vec::new() };
-    let epipolar = search.run(start, &rotation, threshold);
+    let mut ransac = Ransac { pairs, prior, options, random: XorShift64Star(options.seed.max(1)) };
+    let epipolar = ransac.run(start, &rotation, threshold);
     let (rotation, direction) = choose_model(pairs, rotation, epipolar.as_ref(), threshold);
     let is_inlier: Vec<bool> = match &direction {
         Some(direction) => {
@@ -102,7 +97,7 @@ pub fn estimate_motion(
 
 /// Ratio of the outliers of a pure rotation that a direction of translation must explain.
 const MIN_EXPLAINED_RATIO: f64 = 0.5;
-/// Minimum number of such tracks; fewer fit any direction.
+/// Minimum number of outliers of a pure rotation; a direction fits any smaller number of them.
 const MIN_MOVING_TRACKS: usize = 6;
 
 /// Decides between pure rotation and a motion with parallax.
@@ -117,44 +112,23 @@ fn choose_model(
 ) -> (UnitQuaternion<f64>, Option<Vector3<f64>>) {
     let Some(epipolar) = epipolar else { return (rotation, None) };
     let moving = pairs.iter().filter(|pair| (pair.now - rotation * pair.previous).norm() > threshold);
-    let (mut left_over, mut explained) = (0, 0);
+    let (mut outliers, mut explained) = (0, 0);
     for pair in moving {
-        left_over += 1;
+        outliers += 1;
         explained += usize::from(epipolar_distance(pair, &epipolar.rotation, &epipolar.direction) <= threshold);
     }
-    let counts = left_over >= MIN_MOVING_TRACKS && explained as f64 >= MIN_EXPLAINED_RATIO * left_over as f64;
+    let counts = outliers >= MIN_MOVING_TRACKS && explained as f64 >= MIN_EXPLAINED_RATIO * outliers as f64;
     if counts { (epipolar.rotation, Some(epipolar.direction)) } else { (rotation, None) }
-}
-
-/// Distance of a pair from the epipolar geometry as an angle, to first order (Sampson's), in radians.
-///
-/// A point in front of both cameras moves towards `direction`; for a point that moves the other way the distance is the
-/// length of its motion.
-pub(super) fn epipolar_distance(pair: &BearingPair, rotation: &UnitQuaternion<f64>, direction: &Vector3<f64>) -> f64 {
-    let rotated = BearingPair { previous: rotation * pair.previous, now: pair.now };
-    epipolar_distances(&rotated, direction)[0]
-}
-
-/// [`epipolar_distance`] of a pair whose previous bearing is already rotated, for a direction and its opposite, in
-/// radians.
-fn epipolar_distances(pair: &BearingPair, direction: &Vector3<f64>) -> [f64; 2] {
-    let rotated = pair.previous;
-    let normal = direction.cross(&rotated);
-    let other_normal = pair.now.cross(direction);
-    let gap = pair.now.dot(&normal);
-    let scale = normal.norm_squared() + other_normal.norm_squared() - 2.0 * gap * gap;
-    let sampson = if scale > 1e-12 { gap.abs() / scale.sqrt() } else { 0.0 };
-    let along = (direction - rotated * rotated.dot(direction)).dot(&(pair.now - rotated)) / normal.norm().max(1e-6);
-    [sampson.max(-along), sampson.max(along)]
 }
 
 /// Maximum iterations of [`fit_rotation`].
 const ROTATION_ITERATIONS: usize = 12;
 
-/// Robust fit of a rotation to pairs, from an initial one that may have a large error.
+/// Robust fit of a rotation to pairs without parallax, from an initial one that may have a large error.
 ///
-/// Weights decrease with the fourth power of residual over scale; the scale decreases with the median of the residuals,
-/// down to `floor`.
+/// Gauss–Newton on `Σ ρ(|Rᵀ f' − f|)` with `R ← R Exp(φ)` and the loss `ρ` of Geman and McClure: the step solves
+/// `Σ w (I − f fᵀ) φ = Σ w f × Rᵀ f'`. The scale of the loss decreases with the median of the residuals, down to `floor`
+/// (radians).
 pub fn fit_rotation(pairs: &[BearingPair], start: &UnitQuaternion<f64>, floor: f64) -> UnitQuaternion<f64> {
     let linearize = |rotation: &UnitQuaternion<f64>| {
         let lengths = pairs.iter().map(|pair| (pair.now - rotation * pair.previous).norm());
@@ -163,8 +137,7 @@ pub fn fit_rotation(pairs: &[BearingPair], start: &UnitQuaternion<f64>, floor: f
         let mut equations = NormalEquations::zeros(Const::<3>);
         for pair in pairs {
             let now_in_previous = previous_from_now * pair.now;
-            let ratio = (now_in_previous - pair.previous).norm_squared() / (scale * scale);
-            let weight = 1.0 / ((1.0 + ratio) * (1.0 + ratio));
+            let weight = geman_mcclure((now_in_previous - pair.previous).norm_squared() / (scale * scale));
             equations.hessian += weight * (Matrix3::identity() - pair.previous * pair.previous.transpose());
             equations.gradient -= weight * pair.previous.cross(&now_in_previous);
         }
@@ -180,9 +153,9 @@ pub fn fit_rotation(pairs: &[BearingPair], start: &UnitQuaternion<f64>, floor: f
     rotation
 }
 
-/// Scales of the stages, in thresholds.
-const STAGES: [f64; 3] = [6.0, 2.0, 1.0];
-/// Steps of the refinement after each stage.
+/// Scale of the distances in each stage, in thresholds.
+const SCALES: [f64; 3] = [6.0, 2.0, 1.0];
+/// Gauss–Newton steps of the refinement after each stage.
 const REFINEMENTS: usize = 6;
 
 /// With a smaller ratio of outliers the search ends with the first start: a motion with so few outliers is not a local
@@ -190,8 +163,9 @@ const REFINEMENTS: usize = 6;
 const FEW_OUTLIERS_RATIO: f64 = 0.1;
 /// With a larger ratio of outliers motions with a free rotation are also tried.
 const MAX_OUTLIER_RATIO: f64 = 0.3;
-/// Number of random samples of five tracks, and Gauss–Newton steps for each.
-const FULL_HYPOTHESES: usize = 60;
+/// Number of random samples of five tracks.
+const FIVE_TRACK_SAMPLES: usize = 60;
+/// Gauss–Newton steps that solve a sample of five tracks.
 const MINIMAL_ITERATIONS: usize = 5;
 
 /// Prior on the rotation, in units of an inlier's variance.
@@ -224,17 +198,15 @@ impl RotationInformation {
 /// Pairs that are summed between two comparisons of a cost with its limit.
 const PAIRS_BETWEEN_CHECKS: usize = 16;
 
-/// Search for a rotation and a direction of translation.
-struct Search<'a> {
+/// Search for the rotation and the direction of translation with the largest consensus.
+struct Ransac<'a> {
     pairs: &'a [BearingPair],
     prior: RotationInformation,
     options: &'a OutlierOptions,
-    dice: Dice,
-    /// Pairs with the previous bearing rotated by the current rotation.
-    rotated: Vec<BearingPair>,
+    random: XorShift64Star,
 }
 
-impl Search<'_> {
+impl Ransac<'_> {
     /// Best hypothesis from either start, or from the first one with few outliers; `None` without parallax.
     fn run(
         &mut self,
@@ -246,7 +218,7 @@ impl Search<'_> {
         let outlier_ratio = |best: &MotionHypothesis| best.cost / pairs;
         let mut best: Option<MotionHypothesis> = None;
         for rotation in [predicted, fitted] {
-            let found = self.descend(rotation, threshold);
+            let found = self.from_rotation(rotation, threshold);
             if let Some(found) = found
                 && best.is_none_or(|best| found.cost < best.cost)
             {
@@ -257,7 +229,7 @@ impl Search<'_> {
             }
         }
         if best.as_ref().is_none_or(|best| outlier_ratio(best) > MAX_OUTLIER_RATIO)
-            && let Some(found) = self.draw_with_rotation(fitted, threshold)
+            && let Some(found) = self.from_samples_of_five(fitted, threshold)
             && best.is_none_or(|best| found.cost < best.cost)
         {
             best = Some(found);
@@ -265,37 +237,83 @@ impl Search<'_> {
         best
     }
 
-    /// Best of many motions through five random tracks each; used if no start converged.
-    fn draw_with_rotation(&mut self, rotation: &UnitQuaternion<f64>, threshold: f64) -> Option<MotionHypothesis> {
+    /// Samples directions of translation at a rotation and refines the best motion, at decreasing scales.
+    fn from_rotation(&mut self, rotation: &UnitQuaternion<f64>, threshold: f64) -> Option<MotionHypothesis> {
+        let mut best = MotionHypothesis { rotation: *rotation, direction: Vector3::zeros(), cost: f64::INFINITY };
+        for thresholds in SCALES {
+            let scale = thresholds * threshold;
+            if best.cost.is_finite() {
+                best.cost = self.cost(&best.rotation, &best.direction, scale, f64::INFINITY);
+            }
+            if let Some(sampled) = self.sample_directions(&best.rotation, scale, best.cost) {
+                best = sampled;
+            }
+            if best.cost.is_finite() {
+                best = self.refine(best, scale);
+            }
+        }
+        best.cost.is_finite().then_some(best)
+    }
+
+    /// Best direction `t ∝ n₁ × n₂` of random samples of two tracks, with a fixed rotation; `None` if no cost is below
+    /// `limit`.
+    fn sample_directions(
+        &mut self,
+        rotation: &UnitQuaternion<f64>,
+        scale: f64,
+        mut limit: f64,
+    ) -> Option<MotionHypothesis> {
+        let rotated: Vec<BearingPair> = self.pairs.iter().map(|pair| pair.rotated(rotation)).collect();
+        let prior_cost = self.prior_cost(rotation, scale);
         let mut best: Option<MotionHypothesis> = None;
-        for _ in 0..FULL_HYPOTHESES {
-            let sample: [BearingPair; 5] = std::array::from_fn(|_| self.pairs[self.dice.below(self.pairs.len())]);
+        for _ in 0..self.options.hypotheses {
+            let normals = [0, 1].map(|_| {
+                let pair = &rotated[self.random.below(rotated.len())];
+                pair.previous.cross(&pair.now)
+            });
+            let Some(axis) = normals[0].cross(&normals[1]).try_normalize(1e-14) else { continue };
+            let (direction, cost) = better_sign(axis, costs(rotated.iter().copied(), &axis, scale, prior_cost, limit));
+            if cost < limit {
+                limit = cost;
+                best = Some(MotionHypothesis { rotation: *rotation, direction, cost });
+            }
+        }
+        best
+    }
+
+    /// Best motion of random samples of five tracks; used if no start converged.
+    fn from_samples_of_five(&mut self, rotation: &UnitQuaternion<f64>, threshold: f64) -> Option<MotionHypothesis> {
+        let mut best: Option<MotionHypothesis> = None;
+        for _ in 0..FIVE_TRACK_SAMPLES {
+            let sample: [BearingPair; 5] = std::array::from_fn(|_| self.pairs[self.random.below(self.pairs.len())]);
             let normals = [0, 1].map(|k: usize| (rotation * sample[k].previous).cross(&sample[k].now));
             let Some(direction) = normals[0].cross(&normals[1]).try_normalize(1e-14) else { continue };
             let mut trial = MotionHypothesis { rotation: *rotation, direction, cost: f64::INFINITY };
             for _ in 0..MINIMAL_ITERATIONS {
                 // Little damping, and a scale at which all five tracks have full weight.
-                let barely = Matrix3::identity() * 1e-9;
-                let Some(step) = step_towards(&sample, &trial, 1.0, &barely, &Vector3::zeros()) else { break };
+                let damping = Matrix3::identity() * 1e-9;
+                let Some(step) = gauss_newton_step(&sample, &trial, 1.0, &damping, &Vector3::zeros()) else { break };
                 (trial.rotation, trial.direction) = step;
             }
-            for direction in [trial.direction, -trial.direction] {
-                let limit = best.map_or(f64::INFINITY, |best| best.cost);
-                let cost = self.cost(&trial.rotation, &direction, threshold, limit);
-                if cost < limit {
-                    best = Some(MotionHypothesis { direction, cost, ..trial });
-                }
+            let limit = best.map_or(f64::INFINITY, |best| best.cost);
+            let (direction, cost) =
+                better_sign(trial.direction, self.costs(&trial.rotation, &trial.direction, threshold, limit));
+            if cost < limit {
+                best = Some(MotionHypothesis { direction, cost, ..trial });
             }
         }
-        best.map(|best| self.settle(best, threshold))
+        best.map(|best| self.refine(best, threshold))
     }
 
-    /// Best iterate of a few Gauss–Newton steps.
-    fn settle(&self, start: MotionHypothesis, scale: f64) -> MotionHypothesis {
+    /// Best iterate of a few Gauss–Newton steps on all tracks, with weights that reject outliers.
+    fn refine(&self, start: MotionHypothesis, scale: f64) -> MotionHypothesis {
         let (mut best, mut at) = (start, start);
         for _ in 0..REFINEMENTS {
-            let Some(refined) = self.refine(&at, scale, best.cost) else { break };
-            at = refined;
+            let (information, error) = self.prior.at(&at.rotation, scale);
+            let Some((rotation, direction)) = gauss_newton_step(self.pairs, &at, scale, &information, &error) else {
+                break;
+            };
+            at = MotionHypothesis { rotation, direction, cost: self.cost(&rotation, &direction, scale, best.cost) };
             if at.cost < best.cost {
                 best = at;
             }
@@ -303,162 +321,57 @@ impl Search<'_> {
         best
     }
 
-    /// Hypothesizes directions and refines the best one, at decreasing scales.
-    fn descend(&mut self, rotation: &UnitQuaternion<f64>, threshold: f64) -> Option<MotionHypothesis> {
-        let mut best = MotionHypothesis { rotation: *rotation, direction: Vector3::zeros(), cost: f64::INFINITY };
-        for stage in STAGES {
-            let scale = stage * threshold;
-            if best.cost.is_finite() {
-                best.cost = self.cost(&best.rotation, &best.direction, scale, f64::INFINITY);
-            }
-            if let Some(drawn) = self.draw(&best.rotation, scale, best.cost) {
-                best = drawn;
-            }
-            if best.cost.is_finite() {
-                best = self.settle(best, scale);
-            }
-        }
-        best.cost.is_finite().then_some(best)
-    }
-
-    /// Best direction among those of random pairs of tracks, with a fixed rotation; `None` if no cost is below `below`.
-    fn draw(&mut self, rotation: &UnitQuaternion<f64>, scale: f64, mut below: f64) -> Option<MotionHypothesis> {
-        self.rotated.clear();
-        self.rotated
-            .extend(self.pairs.iter().map(|pair| BearingPair { previous: rotation * pair.previous, now: pair.now }));
-        let pull = self.prior_cost(rotation, scale);
-        let mut best: Option<MotionHypothesis> = None;
-        for _ in 0..self.options.hypotheses {
-            // Normals of the epipolar planes at the current rotation.
-            let normals = [0, 1].map(|_| {
-                let pair = &self.rotated[self.dice.below(self.rotated.len())];
-                pair.previous.cross(&pair.now)
-            });
-            let Some(axis) = normals[0].cross(&normals[1]).try_normalize(1e-14) else { continue };
-            let [forward, backward] = self.costs(&axis, scale, pull, below);
-            let (direction, cost) = if forward <= backward { (axis, forward) } else { (-axis, backward) };
-            if cost < below {
-                below = cost;
-                best = Some(MotionHypothesis { rotation: *rotation, direction, cost });
-            }
-        }
-        best
-    }
-
-    /// Costs of a direction and of the opposite one with the rotated pairs: the sum of squared distances, each over
-    /// `scale` and no larger than one, plus `pull`, the cost of the prior.
-    ///
-    /// The sum ends early when both costs reach `limit`; costs below it are complete.
-    fn costs(&self, direction: &Vector3<f64>, scale: f64, pull: f64, limit: f64) -> [f64; 2] {
-        let mut sums = [0.0; 2];
-        for pairs in self.rotated.chunks(PAIRS_BETWEEN_CHECKS) {
-            for pair in pairs {
-                let distances = epipolar_distances(pair, direction);
-                for (sum, distance) in sums.iter_mut().zip(distances) {
-                    *sum += (distance / scale).powi(2).min(1.0);
-                }
-            }
-            if sums.iter().all(|sum| sum + pull >= limit) {
-                break;
-            }
-        }
-        sums.map(|sum| sum + pull)
-    }
-
-    /// Sum of squared distances over `scale`, each truncated at one, plus the cost of the prior.
-    ///
-    /// The sum ends early when the cost reaches `limit`; a cost below it is complete.
     fn cost(&self, rotation: &UnitQuaternion<f64>, direction: &Vector3<f64>, scale: f64, limit: f64) -> f64 {
-        let pull = self.prior_cost(rotation, scale);
-        let mut sum = 0.0;
-        for pairs in self.pairs.chunks(PAIRS_BETWEEN_CHECKS) {
-            for pair in pairs {
-                let distance = epipolar_distance(pair, rotation, direction) / scale;
-                sum += (distance * distance).min(1.0);
-            }
-            if sum + pull >= limit {
-                break;
-            }
-        }
-        sum + pull
+        self.costs(rotation, direction, scale, limit)[0]
     }
 
-    /// Cost of the prior at a rotation, in the unit of [`Self::cost`].
+    /// Costs of a direction and of the opposite one at a rotation, see [`costs`].
+    fn costs(&self, rotation: &UnitQuaternion<f64>, direction: &Vector3<f64>, scale: f64, limit: f64) -> [f64; 2] {
+        let rotated = self.pairs.iter().map(|pair| pair.rotated(rotation));
+        costs(rotated, direction, scale, self.prior_cost(rotation, scale), limit)
+    }
+
+    /// Squared error of a rotation in standard deviations of the prior, in the unit of [`costs`].
     fn prior_cost(&self, rotation: &UnitQuaternion<f64>, scale: f64) -> f64 {
         let (information, rotation_vector) = self.prior.at(rotation, scale);
         rotation_vector.dot(&(information * rotation_vector))
     }
-
-    /// One Gauss–Newton step on rotation and direction, with weights that reject outliers; its cost is that of
-    /// [`Self::cost`] with this limit.
-    fn refine(&self, at: &MotionHypothesis, scale: f64, limit: f64) -> Option<MotionHypothesis> {
-        let (information, rotation_error) = self.prior.at(&at.rotation, scale);
-        let (rotation, direction) = step_towards(self.pairs, at, scale, &information, &rotation_error)?;
-        let cost = self.cost(&rotation, &direction, scale, limit);
-        Some(MotionHypothesis { rotation, direction, cost })
-    }
 }
 
-/// Damping of directions that neither tracks nor prior constrain, in the unit of [`step_towards`]'s normal matrix.
-const MIN_INFORMATION: f64 = 1e-9;
-
-/// A Gauss–Newton step on the epipolar distances of `pairs` in units of `scale`, with weights that decrease with
-/// the distance.
+/// Costs of a direction and of the opposite one for pairs whose previous bearing is rotated: the truncated cost
+/// `Σ min(d²/s², 1)` with the scale `s`, plus the cost of the prior.
 ///
-/// The step is `[φ; δ]`: a right perturbation of the rotation, and two columns on the tangent plane of the direction.
-/// `prior` is the information of the prior rotation (3 × 3), `rotation_error` its error in the current camera
-/// frame, in radians; a step `φ` changes that error by `R·φ` to first order in the error.
-pub(super) fn step_towards(
-    pairs: &[BearingPair],
-    at: &MotionHypothesis,
+/// The sum ends early when both costs reach `limit`; costs below it are complete.
+fn costs(
+    rotated: impl Iterator<Item = BearingPair>,
+    direction: &Vector3<f64>,
     scale: f64,
-    prior: &Matrix3<f64>,
-    rotation_error: &Vector3<f64>,
-) -> Option<(UnitQuaternion<f64>, Vector3<f64>)> {
-    let basis = tangent_basis(&at.direction);
-    let previous_from_now = at.rotation.to_rotation_matrix().into_inner().transpose();
-    // The factorization reads the lower triangle only.
-    let mut normal = SMatrix::<f64, 5, 5>::zeros();
-    let mut right = SVector::<f64, 5>::zeros();
-    for pair in pairs {
-        let rotated = at.rotation * pair.previous;
-        let plane = at.direction.cross(&rotated);
-        let other_plane = pair.now.cross(&at.direction);
-        let gap = pair.now.dot(&plane);
-        let spread = plane.norm_squared() + other_plane.norm_squared() - 2.0 * gap * gap;
-        if spread < 1e-12 {
-            continue;
+    prior_cost: f64,
+    limit: f64,
+) -> [f64; 2] {
+    let mut sums = [0.0; 2];
+    for (index, pair) in rotated.enumerate() {
+        let distances = epipolar_distances(&pair, direction);
+        for (sum, distance) in sums.iter_mut().zip(distances) {
+            *sum += (distance / scale).powi(2).min(1.0);
         }
-        let ratio = gap * gap / (spread * scale * scale);
-        let weight = 1.0 / (spread * scale * scale * (1.0 + ratio) * (1.0 + ratio));
-        let by_rotation = previous_from_now * rotated.cross(&other_plane);
-        let by_direction = basis.tr_mul(&rotated.cross(&pair.now));
-        let row = SVector::<f64, 5>::new(by_rotation.x, by_rotation.y, by_rotation.z, by_direction.x, by_direction.y);
-        for column in 0..5 {
-            for below in column..5 {
-                normal[(below, column)] += row[below] * row[column] * weight;
-            }
+        let is_checked = (index + 1).is_multiple_of(PAIRS_BETWEEN_CHECKS);
+        if is_checked && sums.iter().all(|sum| sum + prior_cost >= limit) {
+            break;
         }
-        right -= row * (gap * weight);
     }
-    let mut corner = normal.fixed_view_mut::<3, 3>(0, 0);
-    corner += previous_from_now * prior * previous_from_now.transpose();
-    let mut top = right.fixed_rows_mut::<3>(0);
-    top -= previous_from_now * (prior * rotation_error);
-    for k in 0..5 {
-        // Without parallax the direction is unobservable; without a prior, so is the rotation about a single track.
-        normal[(k, k)] += MIN_INFORMATION;
-    }
-    let step = normal.cholesky()?.solve(&right);
-    let rotation = so3::plus(&at.rotation, &Vector3::new(step[0], step[1], step[2]));
-    let direction = (at.direction + basis * step.fixed_rows::<2>(3)).try_normalize(1e-9)?;
-    Some((rotation, direction))
+    sums.map(|sum| sum + prior_cost)
 }
 
-/// Small random number generator (xorshift64*), equal on all platforms.
-struct Dice(u64);
+/// A direction or its opposite, whichever has the lower one of both costs, with that cost.
+fn better_sign(direction: Vector3<f64>, [forward, backward]: [f64; 2]) -> (Vector3<f64>, f64) {
+    if forward <= backward { (direction, forward) } else { (-direction, backward) }
+}
 
-impl Dice {
+/// Random number generator xorshift64* (Vigna, 2016), equal on all platforms.
+struct XorShift64Star(u64);
+
+impl XorShift64Star {
     fn below(&mut self, count: usize) -> usize {
         self.0 ^= self.0 >> 12;
         self.0 ^= self.0 << 25;

@@ -3,7 +3,8 @@
 //! The image of a plane is distorted by a homography: an offset `x` in the reference appears at `A x / (1 + wᵀx)`, with
 //! the affine part `A` and the perspective `w`. An affine match is shifted by it, see [`Appearance::perspective_shift`].
 //!
-//! In coordinates of the plane at unit distance, shifted to the feature in both images, with the rotation
+//! The homography of the plane `nᵀX = d` is `R + t nᵀ/d` up to scale (Hartley and Zisserman, *Multiple View Geometry*,
+//! section 13.1). In coordinates of the plane at unit distance, shifted to the feature in both images, with the rotation
 //! `S = T(−q_now) R T(q_reference)` and the slope `m` of the surface in the reference camera (inverse depth changes by
 //! the ratio `mᵀx` at the offset `x`), the homography is `[s₁ s₂ s₃] + (h e₃ − s₃)(m₁, m₂, 1)`: it maps the
 //! feature to itself, with `h` the ratio of its depths now and in the reference. Hence
@@ -38,7 +39,7 @@ pub(super) struct Surface {
     reference: Vector2<f64>,
     /// Derivative of that plane's coordinates by pixels in the reference.
     by_px: Matrix2<f64>,
-    /// Rotation `camera_now_from_camera_reference`.
+    /// `R`, the rotation `camera_now_from_camera_reference`.
     rotation: UnitQuaternion<f64>,
     /// Information about the slope (2 × 2), and its product with the slope (2 × 1).
     information: Matrix2<f64>,
@@ -70,10 +71,10 @@ impl Surface {
         self.rotation = rotation * self.rotation;
         let (now, now_by_px) = on_plane(camera, bearing)?;
         let warp = now_by_px * warp * self.by_px.try_inverse()?;
-        let turned = shift(&-now) * self.rotation.to_rotation_matrix().matrix() * shift(&self.reference);
+        let s = shift(&-now) * self.rotation.to_rotation_matrix().matrix() * shift(&self.reference);
         let affine = Vector4::new(warp.m11, warp.m21, warp.m12, warp.m22);
-        let upper = Vector4::new(turned.m11, turned.m21, turned.m12, turned.m22);
-        let side = turned.fixed_view::<2, 1>(0, 2);
+        let upper = Vector4::new(s.m11, s.m21, s.m12, s.m22);
+        let side = s.fixed_view::<2, 1>(0, 2);
         let mut by_slope = Matrix4x2::zeros();
         by_slope.fixed_view_mut::<2, 1>(0, 0).copy_from(&side);
         by_slope.fixed_view_mut::<2, 1>(2, 1).copy_from(&side);
@@ -86,11 +87,10 @@ impl Surface {
         self.information += measured.tr_mul(&measured) * weight;
         self.weighted_slope += measured.tr_mul(&upper) * weight;
 
-        let slope = self.information.try_inverse()? * self.weighted_slope;
-        let ratio = affine.dot(&(upper - by_slope * slope)) / square;
-        let below = Vector2::new(turned.m31, turned.m32);
-        let perspective = self.by_px.tr_mul(&((below + slope * (ratio - turned.m33)) / ratio));
-        (perspective.norm() < MAX_PERSPECTIVE_PER_PX).then_some(perspective)
+        let m = self.information.try_inverse()? * self.weighted_slope;
+        let h = affine.dot(&(upper - by_slope * m)) / square;
+        let w = self.by_px.tr_mul(&((Vector2::new(s.m31, s.m32) + m * (h - s.m33)) / h));
+        (w.norm() < MAX_PERSPECTIVE_PER_PX).then_some(w)
     }
 }
 

@@ -22,7 +22,7 @@ impl PredictedRotation {
     }
 
     /// Converts a prediction between the first rows to one between the middle rows of a camera with this readout; the
-    /// rates (rad/s, camera frame) are those during the previous and the current image.
+    /// rates (rad/s, camera frame) are taken during the previous and the current image.
     #[must_use]
     pub fn with_readout(self, readout_s: f64, rates_rad_per_s: [Vector3<f64>; 2]) -> Self {
         if readout_s == 0.0 {
@@ -175,10 +175,10 @@ pub fn predict_camera_rotation(
         covariance_rad2 += error * error.transpose();
     }
     let imu_rotation = imu_now_from_imu_previous.to_rotation_matrix().into_inner();
-    let back = camera_now_from_imu.to_rotation_matrix().into_inner();
+    let camera_from_imu = camera_now_from_imu.to_rotation_matrix().into_inner();
     for (before, after) in previous.imu_from_frame.iter().zip(&now.imu_from_frame) {
         let before = before.to_rotation_matrix().into_inner();
-        let by_error = back * (imu_rotation * before - after.to_rotation_matrix().into_inner());
+        let by_error = camera_from_imu * (imu_rotation * before - after.to_rotation_matrix().into_inner());
         covariance_rad2 += by_error * by_error.transpose() * noise.chain_rotation_rad.powi(2);
     }
     let finite = rotation.coords.iter().chain(covariance_rad2.iter()).all(|value| value.is_finite());

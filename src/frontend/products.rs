@@ -1,7 +1,7 @@
 //! Sums of products over a window at its position and at the neighbours to the right, below and diagonally.
 
-/// Side of the tracked square in pixels, on every level.
-pub(super) const WINDOW: usize = 21;
+use super::filters::WINDOW;
+
 /// Elements from one row to the next, of the weights and of the region of the second image: with one stride for both, a sum
 /// over the window is a single loop.
 pub(super) const STRIDE: usize = 32;

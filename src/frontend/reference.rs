@@ -1,8 +1,10 @@
 //! Reference patch of a feature: its window in one image, matched in later ones.
 //!
 //! Tracking from image to image accumulates the errors of all steps. The tracked position is therefore refined against
-//! the reference patch under an affine warp with a gain and an offset (Shi and Tomasi, "Good features to track";
-//! inverse compositional as in Baker and Matthews).
+//! the reference patch under an affine warp `A` with a gain and an offset (Shi and Tomasi, "Good features to track", CVPR
+//! 1994): the pixel at the offset `x` from the patch's centre is found at `m + A x`. A step `D x + d` of the patch (see
+//! `appearance.rs`) is composed inversely (Baker and Matthews, "Lucas–Kanade 20 years on", IJCV 2004):
+//! `A ← A (I + D)⁻¹`, `m ← m − A d` with the new `A`.
 //! If the patch no longer matches, or leaves the image, the feature gets a new reference from the previous image: one
 //! match adds much less error than a step from image to image by a translation alone.
 
@@ -10,7 +12,8 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix2, UnitQuaternion, Vector2, Vector3};
 
-use super::appearance::{Appearance, CENTRE, LANES, Rows, SIDE, WINDOW};
+use super::appearance::{Appearance, Rows, SIDE};
+use super::filters::{CENTRE, LANES, WINDOW};
 use super::perspective::Surface;
 use super::pyramid::cut_out;
 use super::resample::{BORDER, Patch};
@@ -50,7 +53,7 @@ pub(super) struct ReferencePatch {
     appearance: Arc<Appearance>,
     /// Offset of the feature from the window's centre, a whole pixel.
     offset_px: Vector2<f64>,
-    /// Map from offsets in the reference to offsets in the newest image.
+    /// `A`, the map from offsets in the reference to offsets in the newest image.
     warp: Matrix2<f64>,
     /// `None` far from the optical axis.
     surface: Option<Surface>,
@@ -123,10 +126,10 @@ impl ReferencePatch {
             if !finder.patch.read(image, &warp, &middle, appearance.level(), &mut finder.window) {
                 return None;
             }
-            let (correlation, step) = appearance.compare(&finder.window)?;
-            let growth = Matrix2::new(1.0 + step[2], step[3], step[4], 1.0 + step[5]);
-            warp *= growth.try_inverse()?;
-            let shift = warp * Vector2::new(step[0], step[1]);
+            let (correlation, p) = appearance.compare(&finder.window)?;
+            let identity_plus_d = Matrix2::new(1.0 + p[2], p[3], p[4], 1.0 + p[5]);
+            warp *= identity_plus_d.try_inverse()?;
+            let shift = warp * Vector2::new(p[0], p[1]);
             middle -= shift;
             let area = warp.determinant();
             let place = middle + warp * self.offset_px;

@@ -5,7 +5,8 @@
 use nalgebra::{Matrix2, Vector2};
 use pulp::{Arch, NullaryFnOnce};
 
-use super::appearance::{CENTRE, LANES, Rows, WINDOW};
+use super::appearance::Rows;
+use super::filters::{CENTRE, LANES, WINDOW, cubic_weights, rounded_bits};
 use crate::sensors::GrayImage;
 
 /// Row stride of a patch, and its number of rows: enough for a window of twice the area at any rotation.
@@ -18,27 +19,22 @@ const MARGIN: usize = 2;
 /// last ones: interpolation uses one pixel before a point to two after it, and the point may be rounded up.
 pub(super) const BORDER: [usize; 2] = [1, 3];
 
+/// Bits of a rounded coordinate, which is not negative.
+const LOW_BITS: u32 = 0x003f_ffff;
+
 /// Number of steps per pixel for which the weights are tabulated.
 const FRACTIONS: usize = 128;
 
-/// Weights of the four pixels around a point, by Keys' cubic convolution, at fractions of a pixel.
-static CUBIC: [[f32; 4]; FRACTIONS] = cubic_table();
-
-const fn cubic_table() -> [[f32; 4]; FRACTIONS] {
+/// Weights of the four pixels around a point, by cubic convolution, at fractions of a pixel.
+static CUBIC: [[f32; 4]; FRACTIONS] = {
     let mut table = [[0.0; 4]; FRACTIONS];
     let mut index = 0;
     while index < FRACTIONS {
-        let t = index as f32 / FRACTIONS as f32;
-        table[index] = [
-            ((2.0 - t) * t - 1.0) * t * 0.5,
-            ((3.0 * t - 5.0) * t * t + 2.0) * 0.5,
-            ((4.0 - 3.0 * t) * t + 1.0) * t * 0.5,
-            (t - 1.0) * t * t * 0.5,
-        ];
+        table[index] = cubic_weights(index as f32 / FRACTIONS as f32);
         index += 1;
     }
     table
-}
+};
 
 /// Region of an image in floating point, from which windows are resampled.
 #[derive(Clone, Debug)]
@@ -131,7 +127,7 @@ impl Patch {
             let start = middle - corner + warp * Vector2::new(-(CENTRE as f64), down);
             let start = [(start.x * unit) as f32, (start.y * unit) as f32];
             for c in 0..LANES {
-                let [x, y] = [0, 1].map(|k| rounded(start[k] + c as f32 * step[k]));
+                let [x, y] = [0, 1].map(|k| rounded_bits(start[k] + c as f32 * step[k]) & LOW_BITS);
                 places[0][c] = y / FRACTIONS as u32 * STRIDE as u32 + x / FRACTIONS as u32;
                 places[1][c] = x % FRACTIONS as u32;
                 places[2][c] = y % FRACTIONS as u32;
@@ -176,10 +172,4 @@ impl NullaryFnOnce for Cutting<'_> {
             }
         }
     }
-}
-
-/// Nearest integer of a value from 0 to 2²²: adding 1.5·2²³ leaves it in the low bits, where vector units read it
-/// faster than through a checked conversion.
-fn rounded(value: f32) -> u32 {
-    (value + 12_582_912.0).to_bits() & 0x003f_ffff
 }

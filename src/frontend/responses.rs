@@ -1,4 +1,7 @@
 //! Corner response of the pixels of a tile: the smaller eigenvalue of the mean structure tensor around each pixel.
+//!
+//! Shi and Tomasi ("Good features to track", CVPR 1994) select the points at which a window can be tracked best: both
+//! eigenvalues of `G = mean of ∇I ∇Iᵀ` over the window are large, so that the response is `min(λ₁, λ₂)`.
 
 #![expect(clippy::inline_always, reason = "code not inlined is not compiled for the registers of its caller")]
 #![expect(clippy::needless_bitwise_bool, reason = "without branches, many pixels are compared at once")]
@@ -6,7 +9,7 @@
 use nalgebra::Vector2;
 use pulp::{Arch, NullaryFnOnce};
 
-use super::lucas_kanade::{REGISTER, larger, smaller_eigenvalue};
+use super::filters::{REGISTER, larger, scharr, smaller_eigenvalue};
 use super::pyramid::cut_out;
 use crate::sensors::GrayImage;
 
@@ -118,14 +121,11 @@ impl NullaryFnOnce for Computation<'_> {
 fn smaller_eigenvalues(pixels: &[[f32; PIXEL_LANES]; PIXELS], values: &mut [[f32; RESPONSE_LANES]; RESPONSES]) {
     let mut products = [[[0.0_f32; GRADIENT_LANES]; 3]; GRADIENTS];
     for y in 0..GRADIENTS {
-        let (above, here, below) = (&pixels[y], &pixels[y + 1], &pixels[y + 2]);
         for x in 0..GRADIENT_LANES {
-            // Scharr's derivative.
-            let along = 3.0 * (above[x + 2] - above[x] + below[x + 2] - below[x]) + 10.0 * (here[x + 2] - here[x]);
-            let down = 3.0 * (below[x] - above[x] + below[x + 2] - above[x + 2]) + 10.0 * (below[x + 1] - above[x + 1]);
-            products[y][0][x] = along * along;
-            products[y][1][x] = along * down;
-            products[y][2][x] = down * down;
+            let [gx, gy] = scharr([&pixels[y], &pixels[y + 1], &pixels[y + 2]], x);
+            products[y][0][x] = gx * gx;
+            products[y][1][x] = gx * gy;
+            products[y][2][x] = gy * gy;
         }
     }
     let mut column_means = [[0.0_f32; GRADIENT_LANES]; 3];

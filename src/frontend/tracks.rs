@@ -53,7 +53,6 @@ pub struct FrontEndStatistics {
 pub struct TrackedFrame {
     /// Header stamp of the image since the start of the log.
     pub stamp_ns: i64,
-    /// Ordered by id.
     pub features: Vec<TrackedFeature>,
     pub statistics: FrontEndStatistics,
 }

@@ -1,10 +1,11 @@
 //! Readout time of a rolling shutter, measured from feature tracks and the angular rate of the camera.
 //!
-//! Between two images the rotation of each row differs: row `s` (as a ratio of the height) rotates from `t₁ + s₁·ρ` to
-//! `t₂ + s₂·ρ` with the readout `ρ`. Bearings are transformed to the first row of their image by the rate; at the true
-//! readout all of them then satisfy one rotation and one direction of translation. Both are free for each pair of
-//! images, so that errors of gyroscope bias, extrinsics, encoders or time offsets do not bias the readout: it is
-//! measured by the variation of the motion over the rows, where the rate changes between two images or features move
+//! Between two images the rotation of each row differs: a feature in the rows `s₁` and `s₂` (ratios of the height) is
+//! observed at `t₁ + s₁·ρ` and `t₂ + s₂·ρ` with the readout `ρ`. Bearings are transformed to the first row of their image
+//! by the rate, `f ← Exp(∫ ω dt) f` over `s·ρ`; at the true readout all of them then satisfy one rotation and one
+//! direction of translation. Both are free for each pair of images and eliminated by the Schur complement
+//! (`pair_motion.rs`), so that errors of gyroscope bias, extrinsics, encoders or time offsets do not bias the readout: it
+//! is measured by the variation of the motion over the rows, where the rate changes between two images or features move
 //! vertically.
 //!
 //! The rate comes from a gyroscope, or from the rotations of the images themselves by a cubic spline: for a camera that
@@ -12,14 +13,13 @@
 //! readings, whose noise would make the readout too small.
 
 mod pair_motion;
-mod spline;
-mod sweep;
+mod rates;
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
 use self::pair_motion::PairMotion;
-use self::sweep::ReadoutSweep;
+use self::rates::{ReadoutSweep, rates_of};
 use super::outliers::BearingPair;
 use crate::geometry::{SIGMA_PER_MEDIAN, median, so3};
 use crate::sensors::AngularRates;
@@ -53,7 +53,6 @@ pub struct ImagePair {
     pub tracks: Vec<RowTrack>,
 }
 
-/// Options of [`measure_readout`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReadoutOptions {
     /// Largest and smallest standard deviation of a bearing, in radians; the value between them follows from the
@@ -78,8 +77,8 @@ impl ReadoutOptions {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReadoutMeasurement {
-    /// Time from the exposure of the first row to that of a row past the last one; negative if rows are read from the
-    /// bottom up.
+    /// Time from the exposure of the first row to the exposure of a row past the last one; negative if rows are read from
+    /// the bottom up.
     pub readout_s: f64,
     /// Standard deviation from the disagreement of segments of a second, and from their common error: the shutter
     /// itself distorts the image of a feature, so that its tracks have an error of some percent of the effect.
@@ -127,7 +126,7 @@ const MIN_OFFSET_GAIN: f64 = 0.2;
 /// Measures a camera's readout from pairs of images in order of time, and the camera's angular rate by a gyroscope
 /// (camera frame, gyroscope time; bias and errors of the axes do not matter).
 ///
-/// Without a gyroscope the rate is that of the images, which then must be consecutive. Returns `None` with too few
+/// Without a gyroscope the rate is computed from the images, which then must be consecutive. Returns `None` with too few
 /// pairs, or with so little rotation that the rows hardly differ.
 pub fn measure_readout(
     images: &[ImagePair],
@@ -166,19 +165,19 @@ pub fn measure_readout(
 /// Rotation between the first rows of two images of a camera with a known readout.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FirstRowRotation {
-    /// As in [`ImagePair::stamps_s`].
+    /// Times of both first rows as in [`ImagePair::stamps_s`], in seconds.
     pub stamps_s: [f64; 2],
-    /// `camera_now_from_camera_previous`.
+    /// Rotation of the camera between both rows, `camera_now_from_camera_previous`.
     pub rotation: UnitQuaternion<f64>,
     /// Covariance of the rotation vector from the noise of the tracks, with the direction of translation unknown.
     pub covariance_rad2: Matrix3<f64>,
 }
 
 /// Rotations between the first rows of consecutive images at a readout, by the rates of the images themselves; the noise
-/// of the tracks is that of their distances from the motions.
+/// of the tracks is estimated from their distances to the motions.
 ///
-/// A rotation fitted to all features as if they were exposed at once is that of their mean row only if features do not
-/// move over the rows. Pairs with too few features are omitted.
+/// A rotation fitted to all features as if they were exposed at once is the rotation of their mean row only if features
+/// do not move over the rows. Pairs with too few features are omitted.
 pub fn rotations_of_first_rows(
     images: &[ImagePair],
     readout_s: f64,
@@ -208,7 +207,7 @@ struct Pair<'a> {
 }
 
 struct Search<'a> {
-    /// True if the rates are those of the images.
+    /// True if the rates are computed from the images.
     of_images: bool,
     rates: AngularRates,
     options: ReadoutOptions,
@@ -256,7 +255,7 @@ impl<'a> Search<'a> {
         let change = |pair: &Pair<'_>| {
             let [from_s, to_s] = pair.images.stamps_s;
             self.rates.angle_between(from_s - reach_s, to_s + reach_s)?;
-            Some((self.rates.at(to_s)? - self.rates.at(from_s)?).norm())
+            self.rate_change(pair.images.stamps_s)
         };
         let mut ranked: Vec<(f64, usize)> =
             self.pairs.iter().enumerate().filter_map(|(index, pair)| Some((change(pair)?, index))).collect();
@@ -287,8 +286,8 @@ impl<'a> Search<'a> {
         }
         let angles =
             self.pairs.iter().map(|pair| (pair.images.stamps_s, -so3::log(&self.of_middle_rows(pair, readout_s))));
-        self.rates = spline::rates_of(&angles.collect::<Vec<_>>());
-        // Their stamps are those of the first rows, but the rates are those of the middle rows.
+        self.rates = rates_of(&angles.collect::<Vec<_>>());
+        // Stamps belong to the first rows, but these rates to the middle rows.
         self.offset_s = -0.5 * readout_s;
     }
 
@@ -312,13 +311,15 @@ impl<'a> Search<'a> {
         images.tracks.iter().map(carried).collect()
     }
 
+    /// Change of the angular rate between two times, in rad/s; `None` without rates there.
+    fn rate_change(&self, [from_s, to_s]: [f64; 2]) -> Option<f64> {
+        Some((self.rates.at(to_s)? - self.rates.at(from_s)?).norm())
+    }
+
     /// Typical difference between the bearings of different rows of a pair at [`USUAL_READOUT_S`], median over pairs,
     /// in radians.
     fn row_effect_rad(&self) -> f64 {
-        let change = |pair: &Pair<'_>| {
-            let [from_s, to_s] = pair.images.stamps_s.map(|stamp_s| stamp_s + self.offset_s);
-            Some((self.rates.at(to_s)? - self.rates.at(from_s)?).norm())
-        };
+        let change = |pair: &Pair<'_>| self.rate_change(pair.images.stamps_s.map(|stamp_s| stamp_s + self.offset_s));
         median(self.counting().filter_map(change)).unwrap_or(0.0) * USUAL_READOUT_S * USUAL_ROW
     }
 
@@ -395,7 +396,7 @@ impl<'a> Search<'a> {
                 pair.motion.eliminated(&at, [&before, &after], 2.0 * DIFFERENCE_S, self.sigma_rad)?;
             Some((pair.images.stamps_s[0], gradient, information))
         };
-        self.pairs.iter().filter(|pair| pair.counts).filter_map(of_pair).collect()
+        self.counting().filter_map(of_pair).collect()
     }
 
     /// Finds the time offset at which the rates best predict the rotations of the images, up to a constant rate.

@@ -1,21 +1,24 @@
 use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
 
-use super::super::outliers::{BearingPair, MotionHypothesis, epipolar_distance, fit_rotation, step_towards};
+use super::super::epipolar::{
+    BearingPair, EpipolarConstraint, MotionHypothesis, add_outer_product, epipolar_distance, gauss_newton_step,
+};
+use super::super::outliers::fit_rotation;
 use crate::geometry::{so3, tangent_basis};
 
 /// Rotation and, with parallax, direction of translation between two images.
 #[derive(Clone, Debug)]
 pub(super) struct PairMotion {
-    /// `camera_now_from_camera_previous`.
+    /// Rotation `R` = `camera_now_from_camera_previous`.
     pub(super) rotation: UnitQuaternion<f64>,
     direction: Option<Vector3<f64>>,
     /// Squared distances over the variance, truncated, plus the penalty of the unknowns.
     pub(super) cost: f64,
 }
 
-/// Largest cost of a track: that of four standard deviations.
+/// Largest cost of a track, at four standard deviations.
 const LARGEST_COST: f64 = 16.0;
-/// Penalty of an unknown (Akaike's): a direction of translation costs two of them, and the depth of each track one.
+/// Penalty of an unknown (Akaike, 1974): a direction of translation has two of them, and the depth of each track is one.
 const UNKNOWN_COST: f64 = 2.0;
 /// Residual in standard deviations at which the weight of a track is a quarter.
 const WEIGHT_SIGMAS: f64 = 3.0;
@@ -40,7 +43,8 @@ impl PairMotion {
             let mut at = MotionHypothesis { rotation, direction, cost: 0.0 };
             for _ in 0..STEPS {
                 let scale = WEIGHT_SIGMAS * sigma_rad;
-                let Some(step) = step_towards(pairs, &at, scale, &Matrix3::zeros(), &Vector3::zeros()) else { break };
+                let step = gauss_newton_step(pairs, &at, scale, &Matrix3::zeros(), &Vector3::zeros());
+                let Some(step) = step else { break };
                 (at.rotation, at.direction) = step;
             }
             for direction in [at.direction, -at.direction] {
@@ -69,9 +73,10 @@ impl PairMotion {
         pairs.iter().map(distance).collect()
     }
 
-    /// Gradient (1) and information (1 × 1) of a parameter of the bearings after marginalizing the motion; derivative
-    /// by central differences over `step`, from the bearings `around` at half a `step` before and after. `None` if the
-    /// tracks do not constrain the motion.
+    /// Gradient and information of a parameter `p` of the bearings after marginalizing the motion `m` by the Schur
+    /// complement: `g_p − H_pm H_mm⁻¹ g_m` and `H_pp − H_pm H_mm⁻¹ H_mp`. The derivatives of the bearings are central
+    /// differences over `step`, from the bearings `around` at half a `step` before and after. `None` if the tracks do not
+    /// constrain the motion.
     pub(super) fn eliminated(
         &self,
         at: &[BearingPair],
@@ -105,7 +110,8 @@ impl PairMotion {
     }
 }
 
-/// Direction of translation closest to all epipolar planes of a rotation.
+/// Direction of translation closest to all epipolar planes of a rotation: the unit `t` of least `Σ (nᵢᵀ t)²` with the
+/// normals `nᵢ = R fᵢ × f'ᵢ`.
 fn direction_of(pairs: &[BearingPair], rotation: &UnitQuaternion<f64>) -> Vector3<f64> {
     let normals = pairs.iter().map(|pair| (rotation * pair.previous).cross(&pair.now));
     let sum: Matrix3<f64> = normals.map(|normal| normal * normal.transpose()).sum();
@@ -128,18 +134,14 @@ struct Sums {
 
 impl Sums {
     fn add(&mut self, by_motion: &SVector<f64, 5>, by_parameter: f64, residual: f64, weight: f64) {
-        for column in 0..5 {
-            for below in column..5 {
-                self.motion[(below, column)] += by_motion[below] * by_motion[column] * weight;
-            }
-        }
+        add_outer_product(&mut self.motion, by_motion, weight);
         self.motion_right += by_motion * (residual * weight);
         self.mixed += by_motion * (by_parameter * weight);
         self.parameter += by_parameter * by_parameter * weight;
         self.parameter_right += by_parameter * residual * weight;
     }
 
-    /// Adds both components of `now - R·previous`.
+    /// Adds both components of `f' − R f` on the tangent plane of `f'`.
     fn add_rotation(
         &mut self,
         pair: &BearingPair,
@@ -159,7 +161,7 @@ impl Sums {
         }
     }
 
-    /// Adds the distance from the epipolar line.
+    /// Adds Sampson's distance `e/√v` with the derivatives of `e` (see `frontend/epipolar.rs`).
     fn add_epipolar(
         &mut self,
         pair: &BearingPair,
@@ -168,22 +170,18 @@ impl Sums {
         direction: &Vector3<f64>,
         sigma_rad: f64,
     ) {
-        let rotated = rotation * pair.previous;
-        let plane = direction.cross(&rotated);
-        let other_plane = pair.now.cross(direction);
-        let gap = pair.now.dot(&plane);
-        let spread = plane.norm_squared() + other_plane.norm_squared() - 2.0 * gap * gap;
-        if spread < 1e-12 {
+        let constraint = EpipolarConstraint::new(&pair.rotated(rotation), direction);
+        if !constraint.is_regular() {
             return;
         }
-        let scale = spread.sqrt().recip();
-        let by_rotation = rotation.inverse() * rotated.cross(&other_plane);
-        let by_direction = tangent_basis(direction).tr_mul(&rotated.cross(&pair.now));
+        let scale = constraint.variance.sqrt().recip();
+        let by_rotation = rotation.inverse() * constraint.by_rotation();
+        let by_direction = tangent_basis(direction).tr_mul(&constraint.by_direction());
         let by_motion =
             SVector::<f64, 5>::new(by_rotation.x, by_rotation.y, by_rotation.z, by_direction.x, by_direction.y);
-        let by_parameter = now.dot(&plane) + other_plane.dot(&(rotation * previous));
-        let weight = weight_of(gap * scale, sigma_rad);
-        self.add(&(by_motion * scale), by_parameter * scale, gap * scale, weight);
+        let by_parameter = now.dot(&constraint.normal) + constraint.other_normal.dot(&(rotation * previous));
+        let distance = constraint.residual * scale;
+        self.add(&(by_motion * scale), by_parameter * scale, distance, weight_of(distance, sigma_rad));
     }
 
     fn damp(&mut self) {
@@ -202,7 +200,7 @@ impl Sums {
     }
 }
 
-/// Weight of a residual over its variance; decreases with the fourth power.
+/// Geman–McClure weight of a residual, divided by its variance.
 fn weight_of(residual_rad: f64, sigma_rad: f64) -> f64 {
     let ratio = (residual_rad / (WEIGHT_SIGMAS * sigma_rad)).powi(2);
     1.0 / (sigma_rad * sigma_rad * (1.0 + ratio) * (1.0 + ratio))

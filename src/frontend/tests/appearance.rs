@@ -3,7 +3,8 @@
 use nalgebra::{Matrix2, Vector2, Vector6};
 
 use super::{scene, texture};
-use crate::frontend::appearance::{Appearance, CENTRE, LANES, Rows, SIDE, WINDOW};
+use crate::frontend::appearance::{Appearance, Rows, SIDE};
+use crate::frontend::filters::{CENTRE, LANES, WINDOW};
 use crate::frontend::pyramid::cut_out;
 use crate::frontend::resample::Patch;
 use crate::sensors::GrayImage;

@@ -1,14 +1,44 @@
+//! Angular rates of a camera from the rotations of its images, and rotations during the readout from rates.
+
 use nalgebra::Vector3;
 
 use crate::sensors::AngularRates;
+
+/// Number of rows for which the rotation during a readout is computed.
+const NODES: usize = 9;
+
+/// Rotation of a camera during the readout of an image: rotation vectors by row, relative to the first row.
+pub(super) struct ReadoutSweep([Vector3<f64>; NODES]);
+
+impl ReadoutSweep {
+    /// Rotation during the readout of an image whose first row is exposed at a time; zero without rates.
+    pub(super) fn new(rates: &AngularRates, first_row_s: f64, readout_s: f64) -> Self {
+        let start = rates.angle_at(first_row_s);
+        Self(std::array::from_fn(|node| {
+            let row_s = readout_s * node as f64 / (NODES - 1) as f64;
+            match (start, rates.angle_at(first_row_s + row_s)) {
+                (Some(start), Some(end)) => end - start,
+                _ => Vector3::zeros(),
+            }
+        }))
+    }
+
+    /// Rotation vector (rad) at a row, as a ratio of the height: it maps directions in the camera at that row to the
+    /// camera at the first row.
+    pub(super) fn at(&self, row: f64) -> Vector3<f64> {
+        let place = (row * (NODES - 1) as f64).clamp(0.0, (NODES - 1) as f64);
+        let before = (place as usize).min(NODES - 2);
+        self.0[before].lerp(&self.0[before + 1], place - before as f64)
+    }
+}
 
 /// Step of the sampled rates, in seconds.
 const STEP_S: f64 = 0.0025;
 /// Minimum number of consecutive pairs of a spline.
 const MIN_PAIRS: usize = 4;
 
-/// Angular rates from rotation vectors (rad) between consecutive times: the derivative of a cubic spline through their
-/// sums, for each uninterrupted series of pairs.
+/// Angular rates from rotation vectors (rad) between consecutive times: the derivative of the natural cubic spline
+/// through their sums, for each uninterrupted series of pairs.
 pub(super) fn rates_of(pairs: &[([f64; 2], Vector3<f64>)]) -> AngularRates {
     let mut samples = Vec::new();
     let mut first = 0;
@@ -43,7 +73,10 @@ fn sample(pairs: &[([f64; 2], Vector3<f64>)], samples: &mut Vec<(f64, Vector3<f6
     }
 }
 
-/// Rates at the ends of all pairs, such that the second derivative is continuous, and zero at both ends.
+/// Rates `r_k` at the ends of all pairs, for which the second derivative of the spline is continuous, and zero at both
+/// ends: with the lengths `h_k` and the mean rates `m_k` of the pairs
+/// `r_{k−1}/h_{k−1} + 2 (1/h_{k−1} + 1/h_k) r_k + r_{k+1}/h_k = 3 (m_{k−1}/h_{k−1} + m_k/h_k)`, solved by Thomas'
+/// tridiagonal elimination.
 fn knot_rates(pairs: &[([f64; 2], Vector3<f64>)], lengths_s: &[f64]) -> Vec<Vector3<f64>> {
     let count = pairs.len() + 1;
     let mean = |index: usize| pairs[index].1 / lengths_s[index];
