@@ -15,13 +15,17 @@ const SMALL_RADIUS: f64 = 1e-9;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Distortion {
     None,
-    /// Radial–tangential `k1 k2 p1 p2`.
+    /// Radial–tangential `k1 k2 p1 p2` (Brown, "Close-range camera calibration", 1971): with `s = x² + y²`
+    /// `x_d = x·(1 + k1·s + k2·s²) + 2·p1·x·y + p2·(s + 2·x²)`, and the same for `y` with `p1` and `p2` exchanged.
     Radtan([f64; 4]),
     /// Radial–tangential with up to six radial coefficients.
     Rational(RationalLens),
-    /// Equidistant fisheye `k1 k2 k3 k4` of Kannala and Brandt, `θ_d = θ·(1 + k1·θ² + k2·θ⁴ + k3·θ⁶ + k4·θ⁸)`.
+    /// Equidistant fisheye `k1 k2 k3 k4`, `r_d = θ·(1 + k1·θ² + k2·θ⁴ + k3·θ⁶ + k4·θ⁸)` with `θ = atan r` (Kannala and
+    /// Brandt, "A generic camera model and calibration method for conventional, wide-angle, and fish-eye lenses", PAMI
+    /// 2006).
     Equidistant([f64; 4]),
-    /// Field of view of Devernay and Faugeras, with its angle in radians.
+    /// Field of view `w` in radians, `r_d = atan(2 r tan(w/2))/w` (Devernay and Faugeras, "Straight lines have to be
+    /// straight", 2001).
     Fov(f64),
 }
 
@@ -137,7 +141,7 @@ impl Distortion {
         }
     }
 
-    /// `d r_d / d r` on the optical axis.
+    /// Slope `d r_d / d r` on the optical axis.
     fn slope_at_centre(&self) -> f64 {
         match self {
             Self::Fov(w) => 2.0 * (0.5 * w).tan() / w,
@@ -242,7 +246,7 @@ fn invert(
     (mismatch <= MISMATCH_TOLERANCE * (1.0 + distorted.norm()) && is_invertible(square)).then_some(plane)
 }
 
-/// `θ_d` and `d θ_d / d θ`.
+/// Distorted radius `r_d` and `d r_d / d θ`.
 fn equidistant(&[k1, k2, k3, k4]: &[f64; 4], theta: f64) -> (f64, f64) {
     let s = theta * theta;
     let value = theta * (1.0 + s * (k1 + s * (k2 + s * (k3 + s * k4))));

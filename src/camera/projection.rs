@@ -3,23 +3,29 @@ use nalgebra::{Matrix2x3, Vector2, Vector3};
 use super::CameraError;
 
 /// Map from bearings to the normalized image plane, before distortion (Kalibr's `camera_model`).
+///
+/// A point `(x, y, z)` is mapped to `(x, y)/D`; the divisor `D` defines the model. `α` blends between perspective and
+/// sphere; points behind the image plane are in the domain while they project to one pixel only.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Projection {
     /// Pinhole projection `(x/z, y/z)`.
     Pinhole,
-    /// Unified model of Mei and Rives: the unit sphere seen from a point `xi` behind its centre.
+    /// Unified model, `D = z + ξ d` with `d² = x² + y² + z²`: the unit sphere seen from a point `ξ` behind its centre
+    /// (Mei and Rives, "Single view point omnidirectional camera calibration from planar grids", ICRA 2007).
     Omni {
         /// Distance of the second projection centre, at least 0; 0 is the pinhole.
         xi: f64,
     },
-    /// Extended unified model of Khomutenko, Garcia and Martinet.
+    /// Enhanced unified model, `D = α d + (1 − α) z` with `d² = β (x² + y²) + z²` (Khomutenko, Garcia and Martinet, "An
+    /// enhanced unified camera model", RA-L 2016).
     Eucm {
         /// Blend between perspective (0) and the surface (1).
         alpha: f64,
         /// Shape of the surface, positive; 1 is a sphere.
         beta: f64,
     },
-    /// Double sphere of Usenko, Demmel and Cremers.
+    /// Double sphere, `D = α d₂ + (1 − α) (ξ d₁ + z)` with `d₁² = x² + y² + z²`, `d₂² = x² + y² + (ξ d₁ + z)²` (Usenko,
+    /// Demmel and Cremers, "The double sphere camera model", 3DV 2018).
     Ds {
         /// Distance of the two spheres' centres.
         xi: f64,
@@ -55,25 +61,25 @@ impl Projection {
         }
     }
 
-    /// Divisor of x and y for a point, `None` outside the model's domain.
+    /// Divisor `D` of x and y for a point, `None` outside the model's domain.
     fn divisor(&self, x: f64, y: f64, z: f64) -> Option<f64> {
         let radial = x * x + y * y;
         match *self {
             Self::Pinhole => (z > 0.0).then_some(z),
             Self::Omni { xi } => {
-                let distance = (radial + z * z).sqrt();
-                let limit = if xi <= 1.0 { xi } else { 1.0 / xi };
-                (z > -limit * distance).then_some(z + xi * distance)
+                let d = (radial + z * z).sqrt();
+                let w = if xi <= 1.0 { xi } else { 1.0 / xi };
+                (z > -w * d).then_some(z + xi * d)
             }
             Self::Eucm { alpha, beta } => {
-                let distance = (beta * radial + z * z).sqrt();
-                (z > -blend_limit(alpha) * distance).then_some(alpha * distance + (1.0 - alpha) * z)
+                let d = (beta * radial + z * z).sqrt();
+                (z > -blend_limit(alpha) * d).then_some(alpha * d + (1.0 - alpha) * z)
             }
             Self::Ds { xi, alpha } => {
-                let first = (radial + z * z).sqrt();
-                let limit = blend_limit(alpha);
-                let visible = z > -(limit + xi) / (2.0 * limit * xi + xi * xi + 1.0).sqrt() * first;
-                let shifted = xi * first + z;
+                let d1 = (radial + z * z).sqrt();
+                let w1 = blend_limit(alpha);
+                let visible = z > -(w1 + xi) / (2.0 * w1 * xi + xi * xi + 1.0).sqrt() * d1;
+                let shifted = xi * d1 + z;
                 visible.then(|| alpha * (radial + shifted * shifted).sqrt() + (1.0 - alpha) * shifted)
             }
         }
@@ -97,19 +103,19 @@ impl Projection {
         let (lateral, axial) = match *self {
             Self::Pinhole => (0.0, 1.0),
             Self::Omni { xi } => {
-                let distance = (radial + z * z).sqrt();
-                (xi / distance, 1.0 + xi * z / distance)
+                let d = (radial + z * z).sqrt();
+                (xi / d, 1.0 + xi * z / d)
             }
             Self::Eucm { alpha, beta } => {
-                let distance = (beta * radial + z * z).sqrt();
-                (alpha * beta / distance, alpha * z / distance + 1.0 - alpha)
+                let d = (beta * radial + z * z).sqrt();
+                (alpha * beta / d, alpha * z / d + 1.0 - alpha)
             }
             Self::Ds { xi, alpha } => {
-                let first = (radial + z * z).sqrt();
-                let shifted = xi * first + z;
-                let second = (radial + shifted * shifted).sqrt();
-                let by_shifted = alpha * shifted / second + 1.0 - alpha;
-                (alpha / second + by_shifted * xi / first, by_shifted * (xi * z / first + 1.0))
+                let d1 = (radial + z * z).sqrt();
+                let shifted = xi * d1 + z;
+                let d2 = (radial + shifted * shifted).sqrt();
+                let by_shifted = alpha * shifted / d2 + 1.0 - alpha;
+                (alpha / d2 + by_shifted * xi / d1, by_shifted * (xi * z / d1 + 1.0))
             }
         };
         let inverse = 1.0 / divisor;
@@ -125,7 +131,8 @@ impl Projection {
         Some((Vector2::new(u, v), jacobian))
     }
 
-    /// Unit bearing of a point of the normalized image plane, `None` if no bearing projects there.
+    /// Unit bearing of a point of the normalized image plane by the closed forms of the publications, `None` if no bearing
+    /// projects there.
     #[inline]
     pub fn unproject(&self, plane: &Vector2<f64>) -> Option<Vector3<f64>> {
         let square = plane.norm_squared();
@@ -165,7 +172,8 @@ impl Projection {
     }
 }
 
-/// Limit of a blended model's domain behind the image plane: points with `z > -limit · distance` project.
+/// Limit `w` of a blended model's domain behind the image plane, where points with `z > −w d` project: `α/(1 − α)` for
+/// `α ≤ 0.5`, else `(1 − α)/α` (`w₁` of the double sphere).
 fn blend_limit(alpha: f64) -> f64 {
     if alpha <= 0.5 { alpha / (1.0 - alpha) } else { (1.0 - alpha) / alpha }
 }

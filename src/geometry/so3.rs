@@ -5,12 +5,12 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 /// Below this angle (rad) the series of the Jacobians replace the closed forms.
 const SMALL_ANGLE_RAD: f64 = 1e-4;
 
-/// The cross-product matrix `[v]^` with `hat(v)·w = v × w`.
+/// The cross-product matrix `[v]^` (3 × 3) with `hat(v)·w = v × w`.
 pub fn hat(v: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::new(0.0, -v.z, v.y, v.z, 0.0, -v.x, -v.y, v.x, 0.0)
 }
 
-/// `Exp(φ)` for a rotation vector in radians.
+/// `Exp(φ)` for a rotation vector in radians: the rotation by `|φ|` about `φ` (Rodrigues).
 pub fn exp(phi: &Vector3<f64>) -> UnitQuaternion<f64> {
     UnitQuaternion::from_scaled_axis(*phi)
 }
@@ -33,7 +33,8 @@ pub fn composed(first: &UnitQuaternion<f64>, second: &UnitQuaternion<f64>) -> Un
 }
 
 /// Rotation vector (rad) of a body over `duration_s` whose angular rate (rad/s, body frame) changes linearly from
-/// `first` to `second`: two terms of the Magnus expansion, with an error of the fifth order in the duration.
+/// `ω₁` = `first` to `ω₂` = `second`: `φ = (ω₁ + ω₂) T/2 + (ω₁ × ω₂) T²/12`, two terms of the Magnus expansion, with an
+/// error of the fifth order in the duration.
 pub fn of_linear_rate(first: &Vector3<f64>, second: &Vector3<f64>, duration_s: f64) -> Vector3<f64> {
     (first + second) * 0.5 * duration_s + first.cross(second) * (duration_s * duration_s / 12.0)
 }
