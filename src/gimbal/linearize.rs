@@ -193,7 +193,7 @@ fn translate<S: MotionSink>(frame: &mut ChainFrame, axis: Axis, distance_m: f64,
     frame.translate(axis, distance_m);
 }
 
-/// Adds a link without its twist.
+/// Adds a link up to its twist `Rx(α)`, which callers add: the swapped end block has `Ty(y)·Ry(β)` before it.
 fn traverse_link<S: MotionSink>(frame: &mut ChainFrame, link: &DhLink, joint_angle_rad: f64, sink: &mut S) {
     let axis = frame.axis(Axis::Z);
     sink.joint(&axis, &frame.origin);

@@ -6,8 +6,20 @@ use super::ClassicalChain;
 /// all joint angles, in closed form (Eqs. 11–17).
 ///
 /// (12 + 4N) × 6, one direction per column, in radians and metres and in the order of the classical columns.
-/// At the base: a rotation about and a translation along the first axis. At the end: each parameter of the last
-/// link against `effector_from_camera`. Without joints: the two rigid transforms against each other.
+/// At the base: a rotation about and a translation along the first axis,
+///
+/// ```text
+/// φ_IB = e₃, θ₁ = −1        t_IB = −R_IB e₃, d₁ = 1
+/// ```
+///
+/// At the end: each parameter of the last link against `[φ; t]` of `effector_from_camera` = `(R, t)`, with the joint
+/// axis `u = (0, sin α, cos α)`,
+///
+/// ```text
+/// θ = 1: [−Rᵀu; −u × (t + a e₁)]    d = 1: [0; −u]    a = 1: [0; −e₁]    α = 1: [−Rᵀe₁; −e₁ × t]
+/// ```
+///
+/// Without joints: the two rigid transforms against each other.
 pub fn redundant_directions(chain: &ClassicalChain) -> DMatrix<f64> {
     let joints = chain.links.len();
     let camera = 6 + 4 * joints;
