@@ -153,7 +153,7 @@ fn size(text: &str) -> Result<[usize; 2], String> {
 const MAX_SCREENSHOTS: usize = 100_000;
 
 impl ScreenshotArguments {
-    /// True if the picture has a size on paper.
+    /// True if the screenshot has a size on paper.
     fn is_of_paper(&self, format: FormatArgument) -> bool {
         self.figure.has_paper_size() || format == FormatArgument::Pdf
     }
@@ -239,7 +239,7 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<ExitOutcome>
         let path = path_at(cursor_ns);
         let panel = &arguments.panel;
         let at_ns = (!instants.is_assumed).then_some(cursor_ns);
-        let picture = match format {
+        let screenshot = match format {
             _ if is_of_paper => {
                 let spec = arguments.figure.spec(panel, options.theme, at_ns, recording)?;
                 let input = FigureInput::new(recording, shown.images(), &options.playback, slide);
@@ -252,7 +252,7 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<ExitOutcome>
                 draw_panel_svg(panel, recording, cursor_ns, shown.images(), &options, ["clip", &title])?.into_bytes()
             }
         };
-        let mut written = vec![(path.clone(), picture)];
+        let mut written = vec![(path.clone(), screenshot)];
         if arguments.csv {
             let table = panel_csv(panel, recording, cursor_ns, shown.images(), &options)?;
             written.push((path.with_extension("csv"), table.into_bytes()));
@@ -362,8 +362,8 @@ fn of_study(arguments: &ScreenshotArguments) -> Result<ExitOutcome> {
         check_screenshot(&arguments.output.with_extension("csv"), arguments.force)?;
     }
     let study = OpenedStudy::read(&arguments.log)?;
-    let picture = StudyPicture { panel: &arguments.panel, svg, csv: arguments.csv, output: &arguments.output };
-    write_study_picture(&study, &arguments.study.options(), &drawing_options(arguments), &picture)?;
+    let screenshot = StudyScreenshot { panel: &arguments.panel, svg, csv: arguments.csv, output: &arguments.output };
+    write_study_screenshot(&study, &arguments.study.options(), &drawing_options(arguments), &screenshot)?;
     Ok(ExitOutcome::Success)
 }
 

@@ -60,20 +60,20 @@ impl StudyArguments {
 }
 
 /// A panel of a study to be written to a file.
-pub(crate) struct StudyPicture<'a> {
+pub(crate) struct StudyScreenshot<'a> {
     pub(crate) panel: &'a str,
     pub(crate) svg: bool,
     pub(crate) csv: bool,
     pub(crate) output: &'a Path,
 }
 
-pub(crate) fn write_study_picture(
+pub(crate) fn write_study_screenshot(
     study: &OpenedStudy,
     view: &StudyOptions,
     options: &ScreenshotOptions,
-    picture: &StudyPicture<'_>,
+    screenshot: &StudyScreenshot<'_>,
 ) -> Result<()> {
-    let StudyPicture { panel, svg, csv, output } = *picture;
+    let StudyScreenshot { panel, svg, csv, output } = *screenshot;
     let study = study.study();
     if svg {
         let title = format!("{panel} of {}", study.name);
@@ -88,12 +88,12 @@ pub(crate) fn write_study_picture(
 }
 
 /// Writes a screenshot of every panel of a study into a folder and returns the paths.
-pub(crate) fn write_study_pictures(study: &Arc<dcvins::study::view::Study>, folder: &Path) -> Result<Vec<String>> {
+pub(crate) fn write_study_screenshots(study: &Arc<dcvins::study::view::Study>, folder: &Path) -> Result<Vec<String>> {
     let mut paths = Vec::new();
     for name in STUDY_PANEL_NAMES {
         let path = folder.join(format!("{name}.png"));
-        let picture = draw_study_panel(name, study, &StudyOptions::default(), &ScreenshotOptions::default())?;
-        write_png(&picture, &path)?;
+        let screenshot = draw_study_panel(name, study, &StudyOptions::default(), &ScreenshotOptions::default())?;
+        write_png(&screenshot, &path)?;
         paths.push(path.display().to_string());
     }
     Ok(paths)

@@ -57,7 +57,7 @@ mod window {
     use crate::cli::open_log::open_log;
     use crate::cli::prepared_log::prepared_log;
     use crate::cli::run_summary::describe;
-    use crate::cli::study_arguments::write_study_pictures;
+    use crate::cli::study_arguments::write_study_screenshots;
     use crate::cli::terminal::{notify, print};
 
     /// Opens the window, or writes screenshots if there is no display.
@@ -132,7 +132,7 @@ mod window {
         let name = study.folder().file_name().unwrap_or_else(|| study.folder().as_os_str());
         let folder = out.map_or_else(|| Path::new("dcvins-output").join(name), Path::to_path_buf);
         notify(&format!("dcvins: there is no display, so screenshots are written to {}", folder.display()));
-        for path in write_study_pictures(study.study(), &folder)? {
+        for path in write_study_screenshots(study.study(), &folder)? {
             print(&format!("{path}\n"))?;
         }
         Ok(())

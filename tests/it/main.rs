@@ -11,12 +11,12 @@ mod flights;
 mod hostile_logs;
 mod imports;
 mod layering;
+#[cfg(feature = "gui")]
+mod manual_screenshots;
 mod masks;
 mod open_sources;
 mod other_estimators;
 mod outputs;
-#[cfg(feature = "gui")]
-mod pictures;
 mod plan;
 mod python;
 mod release;

@@ -96,8 +96,8 @@ fn a_session_on_a_converted_recording_converts_it_again() {
     fs::write(&saved, session.saved(None).to_text()).unwrap();
     drop(session);
     fs::remove_dir_all(&entry).unwrap();
-    let picture = folder.path().join("a.png").display().to_string();
-    let (saved, at) = (saved.display().to_string(), ["--at", "2.9", "-o", &picture]);
+    let screenshot = folder.path().join("a.png").display().to_string();
+    let (saved, at) = (saved.display().to_string(), ["--at", "2.9", "-o", &screenshot]);
     let (code, _, problem) = dcvins(&cache, &[&["screenshot", &saved, "--panel", "convergence"][..], &at].concat());
     assert!(code == 0 && log_path.is_file(), "{problem}");
     assert!(!problem.contains("differs"), "{problem}");

@@ -72,7 +72,7 @@ fn cpu_and_graphics_adapter_draw_the_same_panels() {
     let mut images = ImageReader::new(Arc::clone(&plan.log), &plan.rig);
     let mut draw = |panel: &str, renderer, options: ScreenshotOptions| {
         let options = ScreenshotOptions { renderer, ..options };
-        draw_panel(panel, &recording, cursor_ns, &mut images, &options).expect("the picture is drawn")
+        draw_panel(panel, &recording, cursor_ns, &mut images, &options).expect("the screenshot is drawn")
     };
     let cases = [
         ("all", ThemeName::Light, [1920, 1080], 1.0),
@@ -81,7 +81,7 @@ fn cpu_and_graphics_adapter_draw_the_same_panels() {
         ("scene", ThemeName::Light, [900, 700], 1.0),
         ("convergence", ThemeName::Print, [1400, 500], 2.0),
     ];
-    let mut pictures = Vec::new();
+    let mut screenshots = Vec::new();
     for (panel, theme, size_px, pixels_per_point) in cases {
         let options = ScreenshotOptions { size_px, pixels_per_point, theme, ..ScreenshotOptions::default() };
         let (cpu, wgpu) = (draw(panel, Renderer::Cpu, options.clone()), draw(panel, Renderer::Wgpu, options));
@@ -94,10 +94,10 @@ fn cpu_and_graphics_adapter_draw_the_same_panels() {
             difference.mean
         ));
         assert!(difference.is_tolerable(), "{panel} at {size_px:?}: {difference:?}");
-        pictures.push(cpu);
+        screenshots.push(cpu);
     }
     // Check of the measure: it distinguishes a panel from itself shifted by a pixel, and from an empty one.
-    let scene = &pictures[3];
+    let scene = &screenshots[3];
     let shifted = RgbaImage::from_fn(scene.width(), scene.height(), |x, y| *scene.get_pixel(x.saturating_sub(1), y));
     assert!(!Difference::between(scene, &shifted).is_tolerable());
     let empty = RgbaImage::from_pixel(scene.width(), scene.height(), *scene.get_pixel(450, 350));
@@ -105,7 +105,7 @@ fn cpu_and_graphics_adapter_draw_the_same_panels() {
     // Exceeds the limit of all adapters.
     let options = ScreenshotOptions { size_px: [16_384, 64], renderer: Renderer::Wgpu, ..ScreenshotOptions::default() };
     match draw_panel("rank", &recording, cursor_ns, &mut images, &options) {
-        Ok(picture) => assert_eq!(picture.dimensions(), (16_384, 64)),
+        Ok(screenshot) => assert_eq!(screenshot.dimensions(), (16_384, 64)),
         Err(ScreenshotError::Graphics(error @ OffscreenError::TooLarge { .. })) => {
             assert!(error.to_string().contains("use --renderer cpu"), "{error}");
         }
@@ -117,11 +117,11 @@ fn cpu_and_graphics_adapter_draw_the_same_panels() {
 #[cfg_attr(not(target_os = "linux"), ignore = "hides the Vulkan drivers by variables of the Linux loader")]
 fn without_an_adapter_the_error_names_the_cpu_renderer() {
     let folder = tempfile::tempdir().unwrap();
-    let picture = folder.path().join("picture.png");
+    let screenshot = folder.path().join("screenshot.png");
     let mut command = Command::new(env!("CARGO_BIN_EXE_dcvins"));
     command.env("DCVINS_CACHE_DIR", "");
     command.args(["screenshot", "--at", "0.5", "--panel", "timeline", "--renderer", "wgpu", "--size", "320x200", "-o"]);
-    command.arg(&picture).arg(sample_log());
+    command.arg(&screenshot).arg(sample_log());
     // No Vulkan driver can be found.
     command.env("WGPU_BACKEND", "vulkan");
     for variable in ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"] {
@@ -131,5 +131,5 @@ fn without_an_adapter_the_error_names_the_cpu_renderer() {
     let message = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{message}");
     let remedy = message.contains("no graphics adapter: ") && message.contains("; use --renderer cpu");
-    assert!(remedy && !message.contains("panicked") && !picture.exists(), "{message}");
+    assert!(remedy && !message.contains("panicked") && !screenshot.exists(), "{message}");
 }

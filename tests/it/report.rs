@@ -112,10 +112,10 @@ fn a_report_holds_everything_and_has_the_same_bytes_twice() {
         assert!(page.contains(text), "'{text}' is missing");
     }
     // Images and the scene are pixels, plots are lines and texts.
-    let pictures = [page.matches("src=\"data:image/png;base64,iVBOR").count(), page.matches("\"><svg width=").count()];
-    assert_eq!(pictures, if cfg!(feature = "gui") { [2, 7] } else { [0, 0] });
+    let images = [page.matches("src=\"data:image/png;base64,iVBOR").count(), page.matches("\"><svg width=").count()];
+    assert_eq!(images, if cfg!(feature = "gui") { [2, 7] } else { [0, 0] });
     check_verdict(&page.replace('\u{a0}', " "), &report);
-    check_captions(&page, pictures.iter().sum());
+    check_captions(&page, images.iter().sum());
     check_glyphs(&page);
     assert_eq!(page.contains("informed rank over time, of 24"), cfg!(feature = "gui"), "plots hold their texts");
     // Findings of `check` about the log are included.

@@ -21,7 +21,7 @@ fn entries(cache: &Path) -> Vec<std::path::PathBuf> {
 }
 
 #[test]
-fn a_picture_of_the_same_command_is_the_same_and_another_one_is_not() {
+fn a_screenshot_of_the_same_command_is_the_same_and_another_one_is_not() {
     let folder = tempfile::tempdir().unwrap();
     let cache = folder.path().join("cache");
     let draw = |name: &str, more: &[&str]| {

@@ -131,7 +131,7 @@ fn check_structure(summary: &Value, rank_csv: &Path, (columns, structural): (u64
 }
 
 #[test]
-fn pictures_of_every_panel_repeat_to_the_byte() {
+fn screenshots_of_every_panel_repeat_to_the_byte() {
     let folder = tempfile::tempdir().unwrap();
     let log = sample("garden.mcap");
     let draw = |panel: &str, name: &str, threads: &str| {
@@ -143,7 +143,7 @@ fn pictures_of_every_panel_repeat_to_the_byte() {
     };
     let first = draw("all", "first.png", "2");
     assert!(first.starts_with(b"\x89PNG"));
-    assert!(first == draw("all", "second.png", "1"), "the same picture twice has the same bytes");
+    assert!(first == draw("all", "second.png", "1"), "the same screenshot twice has the same bytes");
     let output = dcvins(&["screenshot", text_of(&log), "--at", "5", "--panel", "speed", "-o", "x.png"], "2");
     assert_eq!(output.status.code(), Some(1));
     assert!(String::from_utf8_lossy(&output.stderr).contains("convergence"), "the panels that exist are named");

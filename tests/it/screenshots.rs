@@ -47,8 +47,8 @@ fn several_instants_are_named_by_their_time() {
             "{arguments:?}"
         );
         for name in names {
-            let picture = image::open(folder.path().join(name)).unwrap();
-            assert_eq!((picture.width(), picture.height()), (640, 200), "{name}");
+            let screenshot = image::open(folder.path().join(name)).unwrap();
+            assert_eq!((screenshot.width(), screenshot.height()), (640, 200), "{name}");
         }
     };
     check(&["--at", "0.5"], 0, &["line.png"]);

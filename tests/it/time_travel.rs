@@ -171,7 +171,7 @@ fn the_solver_can_be_followed_through_a_step() {
 /// `screenshot` and `report` draw any time of a long log whose steps are kept as summaries only.
 #[cfg(feature = "gui")]
 #[test]
-fn pictures_of_any_instant_have_the_same_bytes_with_little_memory() {
+fn screenshots_of_any_instant_have_the_same_bytes_with_little_memory() {
     use dcvins::export::{PANEL_NAMES, ScreenshotOptions, draw_panel, panel_csv, png_bytes};
     use dcvins::flight_log::ImageReader;
 
@@ -189,9 +189,9 @@ fn pictures_of_any_instant_have_the_same_bytes_with_little_memory() {
         little.fill_in(stamp_ns);
         for panel in PANEL_NAMES {
             let mut drawn = |recording: &Recording| {
-                let picture = draw_panel(panel, recording, stamp_ns, &mut images, &options).expect("it is drawn");
+                let screenshot = draw_panel(panel, recording, stamp_ns, &mut images, &options).expect("it is drawn");
                 let table = panel_csv(panel, recording, stamp_ns, &mut images, &options).ok();
-                (png_bytes(&picture).expect("it is encoded"), table)
+                (png_bytes(&screenshot).expect("it is encoded"), table)
             };
             let (whole, little) = (drawn(&whole), drawn(little.recording()));
             assert!(whole.0 == little.0, "'{panel}' at {stamp_ns} ns looks different with little memory");

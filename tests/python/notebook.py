@@ -39,9 +39,9 @@ def plots():
     outputs = []
     for number in pyplot.get_fignums() if pyplot else []:
         figure = pyplot.figure(number)
-        picture = io.BytesIO()
-        figure.savefig(picture, format="png", dpi=80, bbox_inches="tight")
-        data = {"image/png": base64.b64encode(picture.getvalue()).decode(), "text/plain": lines(repr(figure))}
+        image = io.BytesIO()
+        figure.savefig(image, format="png", dpi=80, bbox_inches="tight")
+        data = {"image/png": base64.b64encode(image.getvalue()).decode(), "text/plain": lines(repr(figure))}
         outputs.append({"data": data, "metadata": {}, "output_type": "display_data"})
         pyplot.close(figure)
     return outputs
@@ -71,8 +71,8 @@ def compared(outputs):
             parts.append(output["text"])
         else:
             # The text of a matplotlib figure has its size, which depends on the version.
-            has_picture = "image/png" in output["data"]
-            parts.append([None if has_picture else output["data"]["text/plain"], sorted(output["data"])])
+            has_image = "image/png" in output["data"]
+            parts.append([None if has_image else output["data"]["text/plain"], sorted(output["data"])])
     return parts
 
 

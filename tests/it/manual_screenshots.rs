@@ -1,7 +1,7 @@
 //! Screenshots of the documents: every panel, every layout, the dialogs and the welcome view, drawn from the sample log
 //! and compared with `docs/images` byte for byte.
 //!
-//! `UPDATE_PICTURES=1 cargo test --release --test it pictures` redraws them; see `docs/images/README.md`.
+//! `UPDATE_SCREENSHOTS=1 cargo test --release --test it manual_screenshots` redraws them; see `docs/images/README.md`.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -41,7 +41,7 @@ const BREAKPOINTS: [&str; 3] = ["rank_informed < 12", "sigma(roll.alpha) < 0.5de
 /// Maximum total size of all screenshots, in bytes.
 const MOST_BYTES: u64 = 3_400_000;
 /// Environment variable with which the test replaces the screenshots.
-const UPDATE: &str = "UPDATE_PICTURES";
+const UPDATE: &str = "UPDATE_SCREENSHOTS";
 /// Colour that marks different pixels.
 const DIFFERENT: Rgba<u8> = Rgba([255, 0, 255, 255]);
 
@@ -114,7 +114,7 @@ impl Subject {
         let mut panel = |name: &str, options: ScreenshotOptions| {
             // The manual describes the panels of the window, with their toolbars.
             let options = ScreenshotOptions { size_px, presentation: Presentation::Interactive, ..options };
-            draw_panel(name, recording, cursor_ns, &mut images, &options).expect("the picture is drawn")
+            draw_panel(name, recording, cursor_ns, &mut images, &options).expect("the screenshot is drawn")
         };
         match self {
             Self::Panel(name @ PanelName::Breakpoints) => {
@@ -165,7 +165,7 @@ impl Subject {
                 let [runs, parameters] = study_sample::tables(study_sample::SEEDS);
                 let study = Arc::new(Study { name: "gimbal-mounts".to_owned(), runs, parameters });
                 let name = panel.map_or("all", StudyPanel::name);
-                draw_study_panel(name, &study, &StudyOptions::default(), &options).expect("the picture is drawn")
+                draw_study_panel(name, &study, &StudyOptions::default(), &options).expect("the screenshot is drawn")
             }
         }
     }
@@ -263,7 +263,7 @@ impl Desktop for Paper {
     }
 
     fn make_sample(&self) -> Result<Receiver<SampleProgress>, String> {
-        Err("the machine of the pictures has no disk".to_owned())
+        Err("the machine of the screenshots has no disk".to_owned())
     }
 
     fn resident_bytes(&self) -> Option<u64> {
@@ -307,17 +307,17 @@ static FOLDER: LazyLock<PathBuf> = LazyLock::new(|| root().join("docs/images"));
 fn committed() -> BTreeSet<String> {
     let entries = fs::read_dir(&*FOLDER).expect("the folder can be listed");
     let paths = entries.map(|entry| entry.expect("the entry can be read").path());
-    let pictures = paths.filter(|path| path.extension().is_some_and(|extension| extension == "png"));
-    pictures.filter_map(|path| path.file_name().map(|name| name.to_string_lossy().into_owned())).collect()
+    let screenshots = paths.filter(|path| path.extension().is_some_and(|extension| extension == "png"));
+    screenshots.filter_map(|path| path.file_name().map(|name| name.to_string_lossy().into_owned())).collect()
 }
 
 /// Screenshot as a PNG, optimized for size: large areas of one colour compress best without filters.
-fn encoded(picture: &RgbaImage) -> Vec<u8> {
+fn encoded(screenshot: &RgbaImage) -> Vec<u8> {
     let mut bytes = Vec::new();
     let encoder = PngEncoder::new_with_quality(&mut bytes, CompressionType::Best, FilterType::NoFilter);
     // Screenshots are opaque.
-    let opaque = DynamicImage::from(picture.clone()).to_rgb8();
-    opaque.write_with_encoder(encoder).expect("the picture is encoded");
+    let opaque = DynamicImage::from(screenshot.clone()).to_rgb8();
+    opaque.write_with_encoder(encoder).expect("the screenshot is encoded");
     bytes
 }
 
@@ -346,7 +346,7 @@ impl Difference {
     }
 
     /// The expected image, faded, with the different pixels marked.
-    fn picture(expected: &RgbaImage, actual: &RgbaImage) -> RgbaImage {
+    fn screenshot(expected: &RgbaImage, actual: &RgbaImage) -> RgbaImage {
         let faded = |channel: u8| 192 + channel / 4;
         RgbaImage::from_fn(expected.width(), expected.height(), |x, y| {
             let Rgba([red, green, blue, _]) = *expected.get_pixel(x, y);
@@ -384,26 +384,26 @@ fn compare(name: &str, actual: &RgbaImage, [folder, kept]: [&Path; 2]) -> Result
         return Err("has the same pixels and another encoding".to_owned());
     };
     let file = kept.join(name.replace(".png", ".difference.png"));
-    Difference::picture(&expected, actual).save(file).expect("the folder of the build can be written");
+    Difference::screenshot(&expected, actual).save(file).expect("the folder of the build can be written");
     let total = width * height;
     Err(format!("{pixels} of {total} pixels differ, between ({left}, {top}) and ({right}, {bottom})"))
 }
 
 #[test]
-fn pictures_of_the_documents_are_those_of_the_program() {
+fn screenshots_of_the_documents_are_those_of_the_program() {
     let sample = sample();
     let update = std::env::var_os(UPDATE).is_some_and(|value| !value.is_empty());
-    let kept = Path::new(env!("CARGO_TARGET_TMPDIR")).join("pictures");
+    let kept = Path::new(env!("CARGO_TARGET_TMPDIR")).join("screenshots");
     let subjects = subjects();
     let differences: Vec<String> = subjects
         .par_iter()
         .filter_map(|subject| {
-            let (name, picture) = (subject.file(), subject.draw(&sample));
+            let (name, screenshot) = (subject.file(), subject.draw(&sample));
             if update {
-                fs::write(FOLDER.join(name), encoded(&picture)).expect("docs/images can be written");
+                fs::write(FOLDER.join(name), encoded(&screenshot)).expect("docs/images can be written");
                 return None;
             }
-            compare(&name, &picture, [&FOLDER, &kept]).err().map(|difference| format!("{name}: {difference}"))
+            compare(&name, &screenshot, [&FOLDER, &kept]).err().map(|difference| format!("{name}: {difference}"))
         })
         .collect();
     let drawn: BTreeSet<String> = subjects.iter().map(|subject| subject.file()).collect();
@@ -412,38 +412,38 @@ fn pictures_of_the_documents_are_those_of_the_program() {
         writeln!(text, "  {difference}").expect("a string can be written");
     }
     for stale in committed().difference(&drawn) {
-        writeln!(text, "  {stale}: no picture has this name, delete the file").expect("a string can be written");
+        writeln!(text, "  {stale}: no screenshot has this name, delete the file").expect("a string can be written");
     }
     assert!(
         text.is_empty(),
-        "pictures in docs/images differ from what the program draws:\n{text}\
-         new pictures and differences: {}\n\
-         if the change is meant: {UPDATE}=1 cargo test --release --test it pictures",
+        "screenshots in docs/images differ from what the program draws:\n{text}\
+         new screenshots and differences: {}\n\
+         if the change is meant: {UPDATE}=1 cargo test --release --test it manual_screenshots",
         kept.display()
     );
 }
 
 #[test]
-fn pictures_are_small_and_every_one_is_in_a_document() {
+fn screenshots_are_small_and_every_one_is_in_a_document() {
     let mut documents = fs::read_to_string(root().join("README.md")).unwrap();
     documents += &fs::read_to_string(root().join("docs/manual.md")).unwrap();
     let names = committed();
     let unused: Vec<&String> = names.iter().filter(|name| !documents.contains(&format!("images/{name})"))).collect();
     assert!(unused.is_empty(), "in no document: {unused:?}");
     let bytes: u64 = names.iter().map(|name| fs::metadata(FOLDER.join(name)).unwrap().len()).sum();
-    assert!(bytes <= MOST_BYTES, "the pictures have {bytes} bytes together, more than {MOST_BYTES}");
+    assert!(bytes <= MOST_BYTES, "the screenshots have {bytes} bytes together, more than {MOST_BYTES}");
 }
 
 #[test]
 fn differences_are_counted_and_located() {
-    let picture = RgbaImage::from_fn(40, 30, |x, y| Rgba([x as u8, y as u8, 7, 255]));
+    let screenshot = RgbaImage::from_fn(40, 30, |x, y| Rgba([x as u8, y as u8, 7, 255]));
     let check = |changed: &[[u32; 2]], expected: Option<Difference>| {
-        let mut other = picture.clone();
+        let mut other = screenshot.clone();
         for [x, y] in changed {
             other.get_pixel_mut(*x, *y).0[2] = 8;
         }
-        assert_eq!(Difference::between(&picture, &other), expected, "{changed:?}");
-        let marked = Difference::picture(&picture, &other);
+        assert_eq!(Difference::between(&screenshot, &other), expected, "{changed:?}");
+        let marked = Difference::screenshot(&screenshot, &other);
         let count = marked.pixels().filter(|pixel| **pixel == DIFFERENT).count();
         assert_eq!(count, changed.len());
     };
@@ -455,17 +455,17 @@ fn differences_are_counted_and_located() {
 #[test]
 fn files_are_compared_byte_for_byte() {
     let (folder, kept) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    let picture = RgbaImage::from_fn(40, 30, |x, y| Rgba([x as u8, y as u8, 7, 255]));
+    let screenshot = RgbaImage::from_fn(40, 30, |x, y| Rgba([x as u8, y as u8, 7, 255]));
     let check = |expected: Result<(), &str>| {
-        let found = compare("a.png", &picture, [folder.path(), kept.path()]);
+        let found = compare("a.png", &screenshot, [folder.path(), kept.path()]);
         assert_eq!(found, expected.map_err(str::to_owned));
     };
     check(Err("missing"));
-    assert_eq!(fs::read(kept.path().join("a.png")).unwrap(), encoded(&picture));
+    assert_eq!(fs::read(kept.path().join("a.png")).unwrap(), encoded(&screenshot));
     let write = |other: &RgbaImage| fs::write(folder.path().join("a.png"), encoded(other)).unwrap();
-    write(&picture);
+    write(&screenshot);
     check(Ok(()));
-    let mut changed = picture.clone();
+    let mut changed = screenshot.clone();
     changed.put_pixel(5, 6, DIFFERENT);
     write(&changed);
     check(Err("1 of 1200 pixels differ, between (5, 6) and (5, 6)"));
@@ -473,8 +473,8 @@ fn files_are_compared_byte_for_byte() {
     assert_eq!(*marked.get_pixel(5, 6), DIFFERENT);
     write(&RgbaImage::new(30, 40));
     check(Err("has 30×40 pixels, drawn anew 40×30"));
-    picture.save(folder.path().join("a.png")).unwrap();
+    screenshot.save(folder.path().join("a.png")).unwrap();
     check(Err("has the same pixels and another encoding"));
     fs::write(folder.path().join("a.png"), "text").unwrap();
-    assert!(compare("a.png", &picture, [folder.path(), kept.path()]).unwrap_err().starts_with("cannot be decoded"));
+    assert!(compare("a.png", &screenshot, [folder.path(), kept.path()]).unwrap_err().starts_with("cannot be decoded"));
 }
