@@ -40,17 +40,21 @@ impl Motion {
 
     /// Name in tables and files; joints by their names, if given.
     pub fn name(self, joint_names: &[String]) -> String {
-        let axis = |axis: usize, names: [&str; 3]| names.get(axis).copied().unwrap_or("?").to_owned();
-        match self {
-            Self::Translation(along) => axis(along, ["move x", "move y", "move z"]),
-            Self::Rotation(about) => axis(about, ["turn x", "turn y", "turn z"]),
-            Self::Joint(joint) => joint_names.get(joint).cloned().unwrap_or_else(|| format!("joint {}", joint + 1)),
-        }
+        self.named(["move", "turn"], joint_names)
     }
 
     /// Label in the window: `trans x`, `rot z`; joints as in [`Self::name`].
     pub fn label(self, joint_names: &[String]) -> String {
-        self.name(joint_names).replace("move ", "trans ").replace("turn ", "rot ")
+        self.named(["trans", "rot"], joint_names)
+    }
+
+    fn named(self, [translation, rotation]: [&str; 2], joint_names: &[String]) -> String {
+        let axis = |axis: usize| ["x", "y", "z"].get(axis).copied().unwrap_or("?");
+        match self {
+            Self::Translation(along) => format!("{translation} {}", axis(along)),
+            Self::Rotation(about) => format!("{rotation} {}", axis(about)),
+            Self::Joint(joint) => joint_names.get(joint).cloned().unwrap_or_else(|| format!("joint {}", joint + 1)),
+        }
     }
 }
 
