@@ -133,8 +133,9 @@ impl Estimator {
 
 /// Factor on the standard deviations of a pass when they become the prior of the next.
 ///
-/// Each pass uses the measurements again. With a factor k the information of the last pass is that of the measurements
-/// times 1 + 1/k² + 1/k⁴ + …: at most 4/3 for k = 2, so its standard deviations are too small by at most 13 %.
+/// Each pass uses the measurements again. With a factor k the information of the last pass is the information of the
+/// measurements times 1 + 1/k² + 1/k⁴ + …: at most 4/3 for k = 2, so its standard deviations are too small by at most
+/// 13 %.
 const SIGMA_FACTOR: f64 = 2.0;
 
 impl Estimator {

@@ -46,7 +46,7 @@ impl StepInput<'_> {
     }
 }
 
-/// Measurements of one step, from which a packed estimator restores those of its window.
+/// Measurements of one step, from which a packed estimator restores the measurements of its window.
 pub trait StepMeasurements {
     /// Stamp of the image, as in [`StepInput`].
     fn stamp_ns(&self) -> i64;

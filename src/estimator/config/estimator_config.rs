@@ -26,7 +26,6 @@ pub struct EstimatorConfig {
     pub auto_parameterize: bool,
     /// Standard deviation of an encoder reading, `None` without encoders.
     pub encoder_sigma_rad: Option<f64>,
-    /// Use encoder readings.
     pub use_encoder: bool,
     /// Estimate the static calibration; joint angles are always estimated.
     pub calibrate: bool,
@@ -69,7 +68,7 @@ pub struct RigidCamera {
     /// Key of the camera in the rig, used in parameter names: `cam1`.
     pub key: String,
     pub model: CameraModel,
-    /// Given `imu_from_camera`.
+    /// Extrinsics of the rig, `imu_from_camera`.
     pub imu_from_camera: RigidTransform,
     /// Prior standard deviations of the extrinsics, in metres and radians.
     pub prior: (f64, f64),

@@ -76,7 +76,7 @@ pub struct Event {
     pub message: String,
     /// Deciding value, `None` without one.
     pub value: Option<f64>,
-    /// Threshold for `value`.
+    /// Limit that `value` is compared with.
     pub threshold: Option<f64>,
     /// Criterion of a [`EventKind::Failure`], `None` for other events.
     pub cause: Option<FailureCause>,

@@ -14,7 +14,7 @@ pub struct ReportBytes {
     pub features: usize,
     pub observations: usize,
     pub landmarks: usize,
-    /// Linearization, if stored.
+    /// Bytes of the linearization; zero if it is not stored.
     pub linearization: usize,
     pub jacobian: usize,
     /// Report struct, events, residuals, iterations and warnings.

@@ -50,7 +50,7 @@ pub struct JacobianSource {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct ExactSource {
     pub(crate) linearized: (Vec<FrameState>, Calibrations),
-    /// Final estimate.
+    /// Estimate after the last iteration.
     pub(crate) current: (Vec<FrameState>, Calibrations),
 }
 
@@ -163,7 +163,7 @@ impl JacobianSource {
             + self.exact.as_ref().map_or(0, |exact| allocated_bytes(exact.bytes()))
     }
 
-    /// True if `parameters` are those of the calibration columns.
+    /// True if `parameters` are the parameters of the calibration columns.
     pub(crate) fn describes(&self, parameters: &[ParameterId]) -> bool {
         if let Some(exact) = &self.exact {
             return exact.linearized.1.parameters() == parameters;

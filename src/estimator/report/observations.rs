@@ -51,7 +51,6 @@ impl Observations {
         self.packed.is_empty()
     }
 
-    /// Unpacked observations.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = ObservationReport> + '_ {
         self.packed.iter().map(PackedObservation::unpacked)
     }

@@ -2,9 +2,9 @@ use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector6};
 
 /// Covariance (6 × 6) of a pose `world_from_imu`.
 ///
-/// The origin of the world and the direction of its axes are those of the first frame after the initialization, where
-/// the variances of position and yaw are nearly zero; they grow from there. Calibration, velocities, biases, joint
-/// angles and landmarks are marginalized.
+/// The world has the origin and the axes of the first frame after the initialization, where the variances of position
+/// and yaw are nearly zero; they grow from there. Calibration, velocities, biases, joint angles and landmarks are
+/// marginalized.
 ///
 /// Rows and columns: rotation vector in the IMU frame (`R exp(δφ)`, rad), then position in the world (m).
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -28,7 +28,7 @@ pub(crate) struct Initializer {
     pub(crate) calibration: Calibrations,
     /// Last pose before the failure, at which a restarted window starts.
     resume_at: Option<RigidTransform>,
-    /// Oldest first.
+    /// Frames before the first window, oldest first.
     waiting: VecDeque<WaitingFrame>,
     stationary: Option<StationaryEstimate>,
 }
@@ -171,7 +171,7 @@ impl Initializer {
         if joints == 0 {
             return base.for_rigid_camera(rotation_rad, translation_m);
         }
-        // The rig's bounds are those of uniform errors (σ·√3).
+        // The rig's bounds belong to uniform errors (σ·√3).
         let bounds = ChainPrior {
             translation_bound_m: translation_m * 3.0_f64.sqrt(),
             rotation_bound_rad: rotation_rad * 3.0_f64.sqrt(),

@@ -21,7 +21,7 @@ pub struct CalibrationPosterior {
 pub struct CameraPosterior {
     pub chain: ClassicalChain,
     pub parameterization: Parameterization,
-    /// Parameters of the columns, named as those of the main camera.
+    /// Parameters of the columns, with the names of the main camera's parameters.
     pub parameters: Vec<ParameterId>,
     pub values: Vec<f64>,
     /// Standard deviations of the columns under the prior of the rig.

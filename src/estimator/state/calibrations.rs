@@ -48,7 +48,7 @@ impl Calibrations {
         Self { cameras: cameras.collect(), ..self }
     }
 
-    /// Values of all cameras with `covariance`, that of all free columns; `None` if the calibration is fixed.
+    /// Values of all cameras with the `covariance` of all free columns; `None` if the calibration is fixed.
     pub(crate) fn posterior(&self, covariance: &DMatrix<f64>) -> Option<CalibrationPosterior> {
         let count: usize = self.cameras.iter().map(Calibration::dof).sum();
         if count == 0 || count > covariance.nrows() {
@@ -216,7 +216,7 @@ impl Calibrations {
     }
 
     /// Keeps the first estimates of calibrations with columns in the marginalization prior, or sets them to the current
-    /// values; removes those of the others.
+    /// values; removes the first estimates of the others.
     pub(crate) fn keep_first_estimates(&mut self, prior_holds: impl Fn(&Range<usize>) -> bool) {
         for camera in 0..self.cameras() {
             let columns = self.columns(camera);

@@ -6,7 +6,7 @@ use crate::optimization::Landmark;
 
 #[derive(Clone, Debug)]
 pub(crate) struct Estimate {
-    /// States by slot.
+    /// State of each frame by slot.
     pub(crate) frames: Vec<FrameState>,
     pub(crate) calibration: Calibrations,
     /// Landmarks by camera, in the order of the camera's tracks.

@@ -37,7 +37,7 @@ impl InformedMotion {
         self.information.as_ref()
     }
 
-    /// These samples and those of the next interval, integrated with this bias.
+    /// These samples and the samples of the next interval, integrated with this bias.
     pub(crate) fn followed_by(self, samples: &[ImuSample]) -> Self {
         let mut joined = self.preintegration;
         joined.extend(samples);

@@ -38,7 +38,7 @@ pub(crate) struct Rates {
 }
 
 impl Rates {
-    /// Rates at the last of `imu`, whose stamp is that of the frame.
+    /// Rates at the last of `imu`, which has the stamp of the frame.
     pub(crate) fn at(imu: &[ImuSample], encoder: Option<&JointAngles>, profile: Option<MotionProfile>) -> Arc<Self> {
         let gyroscope_rad_per_s = imu.last().map_or_else(Vector3::zeros, |sample| sample.angular_velocity_rad_per_s);
         let finite = gyroscope_rad_per_s.iter().all(|rate| rate.is_finite());
@@ -130,7 +130,7 @@ impl FrameState {
         DVector::from_vec(all)
     }
 
-    /// [`Self::motion_at`] zero.
+    /// Motion of the frame without a time offset, [`Self::motion_at`] zero.
     pub(crate) fn motion(&self) -> DVector<f64> {
         self.motion_at(0.0)
     }
@@ -145,8 +145,8 @@ impl FrameState {
         self.rates.gyroscope_rad_per_s - self.navigation.bias.gyroscope_rad_per_s
     }
 
-    /// `x ⊞ δ` with `δ` in the order of [`Layout`](super::layout::Layout): pose, joints, velocity and biases, those of the
-    /// IMU on the gimbal.
+    /// `x ⊞ δ` with `δ` in the order of [`Layout`](super::layout::Layout): pose, joints, velocity and biases, then
+    /// velocity and biases of the IMU on the gimbal.
     pub(crate) fn plus(&self, delta: &[f64]) -> Self {
         let block = self.joint_block();
         let mut navigation = Vector15::zeros();

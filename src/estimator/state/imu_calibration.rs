@@ -10,7 +10,7 @@ const SCALE_SIGMA: f64 = 0.01;
 /// Prior standard deviation of each component of the rotation between gyroscope and accelerometer, in radians.
 const ROTATION_SIGMA_RAD: f64 = 0.01;
 
-/// Intrinsics of the IMU, relative to those of the rig, by which the samples are already corrected.
+/// Intrinsics of the IMU, relative to the intrinsics of the rig, by which the samples are already corrected.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct ImuCalibration {
     given: ImuIntrinsics,
@@ -32,7 +32,7 @@ impl ImuCalibration {
         &self.values
     }
 
-    /// Values of the total correction, that of the rig included.
+    /// Values of the total correction, including the rig's correction.
     pub(crate) fn values(&self) -> ImuErrors {
         imu_errors::of_intrinsics(&imu_errors::intrinsics(&self.values).after(&self.given))
     }

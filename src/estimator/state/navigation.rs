@@ -43,7 +43,7 @@ impl NavigationState {
         }
     }
 
-    /// `self ⊟ origin`.
+    /// Difference `self ⊟ origin` (15 × 1), in the order of [`Vector15`].
     pub fn minus(&self, origin: &Self) -> Vector15 {
         let mut delta = Vector15::zeros();
         delta.fixed_rows_mut::<6>(0).copy_from(&self.world_from_imu.minus(&origin.world_from_imu));

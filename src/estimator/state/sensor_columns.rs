@@ -26,7 +26,8 @@ const GIMBAL_IMU_ROTATION_SIGMA_RAD: f64 = 0.02;
 /// Prior standard deviation of each component of the position of an IMU on the gimbal relative to the rig, in metres: a
 /// board within a camera's housing is known to its half.
 const GIMBAL_IMU_TRANSLATION_SIGMA_M: f64 = 0.02;
-/// Prior of intrinsics for which the rig has none: those of a target calibration, used at another focus.
+/// Prior of intrinsics for which the rig has none: the uncertainty of a target calibration that is used at another
+/// focus.
 const INTRINSICS_SIGMA: IntrinsicsSigma = IntrinsicsSigma { focal_ratio: 0.02, centre_px: 10.0, distortion: 0.03 };
 
 impl SensorColumn {

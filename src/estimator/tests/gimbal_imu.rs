@@ -181,7 +181,7 @@ fn missing_samples_leave_an_interval_without_a_factor() {
 }
 
 /// Without encoders a change of a joint offset with the opposite change of the joint angle of every frame leaves all
-/// measurements as they are, those of the second IMU included.
+/// measurements as they are, including the measurements of the second IMU.
 #[test]
 fn joint_offsets_stay_unobservable_without_encoders() {
     let test = fixture::gimbal_imu_window(EstimatorOptions::default(), |_| {});
@@ -210,7 +210,7 @@ fn joint_offsets_stay_unobservable_without_encoders() {
 }
 
 /// Chain, joint angles and attitude far from the linearization point of the prior: the derivatives of the second IMU by
-/// chain and joint angles are those of its residuals.
+/// chain and joint angles are the derivatives of its residuals.
 #[test]
 fn derivatives_of_the_second_imu_are_those_at_the_current_estimate() {
     let mut test = fixture::gimbal_imu_window(EstimatorOptions::default(), |_| {});

@@ -33,7 +33,7 @@ impl SuspectedParameter {
         self.change * self.change * self.information
     }
 
-    /// Combines the estimate with that of another window for the same parameter.
+    /// Combines the estimate with the estimate of another window for the same parameter.
     pub(crate) fn add(&mut self, other: &Self) {
         let information = self.information + other.information;
         self.change = (self.change * self.information + other.change * other.information) / information;

@@ -49,7 +49,8 @@ impl Frames {
         }
     }
 
-    /// Removes the frame at a slot before the newest one; its IMU samples are prepended to those of the next frame.
+    /// Removes the frame at a slot before the newest one; its IMU samples are prepended to the samples of the next
+    /// frame.
     pub(crate) fn drop_before_newest(&mut self, slot: usize) {
         if slot >= self.newest_slot() {
             return;

@@ -8,12 +8,12 @@ use crate::optimization::RobustLoss;
 /// 0.92. Narrower ones, such as 2.4 (an efficiency of 95 % under normal noise), lose more of the correct observations
 /// than of the sliding ones.
 const SCALE_IN_SIGMAS: f64 = 3.3;
-/// Bounds of the scale, in standard deviations of a pixel: the largest is that of a recording whose clocks, lens or
-/// shutter are wrong, so that correct observations keep their weight.
+/// Bounds of the scale, in standard deviations of a pixel: the largest is for a recording whose clocks, lens or shutter
+/// are wrong, so that correct observations keep their weight.
 const BOUNDS: [f64; 2] = [0.3, 1.0];
-/// Smallest standard deviation of an observation relative to that of the options. It is the scale of the loss down to
-/// there: the errors of a track last as long as the track, so that several times its residuals count as noise, as much on
-/// clean images as on others.
+/// Smallest standard deviation of an observation relative to the standard deviation of the options. It is the scale of
+/// the loss down to there: the errors of a track last as long as the track, so that several times its residuals count
+/// as noise, as much on clean images as on others.
 const LEAST_NOISE: f64 = 0.5;
 /// Time constant with which the scale follows, in seconds.
 const TIME_CONSTANT_S: f64 = 2.0;
@@ -30,7 +30,7 @@ impl Default for LossScale {
 }
 
 impl LossScale {
-    /// Ratio of the standard deviation of the camera's observations to that of the options.
+    /// Ratio of the standard deviation of the camera's observations to the standard deviation of the options.
     pub(crate) fn noise(self, option: VisualLoss) -> f64 {
         match option {
             VisualLoss::Adaptive => self.0.max(LEAST_NOISE),

@@ -77,7 +77,7 @@ struct PackedMotion {
 enum PackedSamples {
     /// Samples of consecutive steps in `past`: first index and end index (exclusive).
     OfSteps(usize, usize),
-    /// Copied samples.
+    /// Samples of no stored step, copied.
     Own(Vec<ImuSample>),
 }
 

@@ -167,7 +167,7 @@ impl WindowState {
     }
 }
 
-/// Residuals by kind of factor, those of zero-velocity updates and of the gimbal's IMU only where there are some.
+/// Residuals by kind of factor; residuals of zero-velocity updates and of the gimbal's IMU only where there are some.
 fn residual_summaries(solution: &Solution) -> Vec<ResidualSummary> {
     let (before, after) = (&solution.costs_before, &solution.costs_after);
     let shown =
