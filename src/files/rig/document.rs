@@ -15,7 +15,7 @@ use crate::text::{shortened, without_bom};
 /// Largest rig file in bytes; the rig of 16 links and 16 cameras takes 16 kB.
 const MAX_RIG_BYTES: u64 = 1 << 20;
 
-/// Parsed rig file.
+/// Parsed rig file with its text.
 #[derive(Clone, Debug)]
 pub(crate) struct Document {
     pub(crate) value: Located,

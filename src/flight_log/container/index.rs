@@ -22,7 +22,7 @@ pub(crate) struct ChannelRecord {
     pub(crate) topic: String,
     /// Such as `sensor_msgs/msg/Imu`; empty without a schema.
     pub(crate) schema_name: String,
-    /// Such as `cdr`.
+    /// Encoding of the messages, such as `cdr`.
     pub(crate) encoding: String,
     /// Message definition in the language `ros2msg`, `None` for another language.
     pub(crate) definition: Option<Arc<str>>,

@@ -31,7 +31,7 @@ pub enum ConvertError {
     Unreadable { problem: String, path: PathBuf },
     #[error("line {line}: {problem}: {}", path.display())]
     Line {
-        /// Counted from 1.
+        /// Line number, counted from 1.
         line: usize,
         problem: String,
         path: PathBuf,

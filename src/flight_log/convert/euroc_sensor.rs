@@ -31,7 +31,7 @@ const ROTATION_TOLERANCE: f64 = 1e-3;
 
 /// Folder of a camera.
 pub(super) struct CameraSensor {
-    /// Such as `cam0`.
+    /// Key in the rig, such as `cam0`.
     pub(super) key: String,
     pub(super) folder: PathBuf,
     /// Stamps of the camera's images.

@@ -137,7 +137,7 @@ fn rig_beside(source: &Path) -> Option<PathBuf> {
 
 enum SourceRig {
     None,
-    /// Complete calibration.
+    /// Rig with a complete calibration.
     Calibrated(Box<Rig>),
     /// Facts about a video, from which a rig with otherwise assumed fields is written.
     Video(VideoFacts),

@@ -24,16 +24,15 @@ pub struct ConvertOptions {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AutopilotLogKind {
-    /// `ULog` of PX4.
+    /// `ULog`, the log of PX4.
     Ulog,
-    /// `DataFlash` of `ArduPilot`.
+    /// `DataFlash`, the log of `ArduPilot`.
     DataFlash,
     /// `MAVLink` telemetry log of a ground station.
     Tlog,
 }
 
 impl AutopilotLogKind {
-    /// Name in reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::Ulog => "PX4 ULog",

@@ -19,7 +19,7 @@ enum Field {
     Bytes,
     F64s(usize),
     F64Sequence,
-    /// Sequence of `geometry_msgs/TransformStamped`.
+    /// Sequence of `geometry_msgs/TransformStamped`, as in a `TFMessage`.
     Transforms,
 }
 

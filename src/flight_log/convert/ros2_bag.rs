@@ -42,7 +42,7 @@ fn segments(folder: &Path) -> Result<Vec<PathBuf>, ConvertError> {
     Ok(paths)
 }
 
-/// Content of `metadata.yaml`.
+/// Content of the file `metadata.yaml`.
 #[derive(Default)]
 struct BagMetadata {
     segments: Vec<PathBuf>,

@@ -25,7 +25,7 @@ const OTHER_TOPICS: &str = "(other topics)";
 /// Bytes of a message in the encoding of its source.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Payload<'a> {
-    /// ROS 1 serialization.
+    /// Bytes in the serialization of ROS 1.
     Ros1(&'a [u8]),
     /// CDR with its encapsulation header.
     Cdr(&'a [u8]),

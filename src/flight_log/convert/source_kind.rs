@@ -28,7 +28,6 @@ pub enum SourceKind {
 }
 
 impl SourceKind {
-    /// Name in reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::Euroc => "EuRoC folder",

@@ -102,7 +102,7 @@ pub(crate) struct TransformEntry<'a> {
     pub(crate) stamp_ns: i64,
     pub(crate) parent: &'a str,
     pub(crate) child: &'a str,
-    /// `parent_from_child`.
+    /// Rotation `parent_from_child`; `None` for an invalid quaternion.
     pub(crate) rotation: Option<UnitQuaternion<f64>>,
 }
 

@@ -21,7 +21,7 @@ use crate::sensors::{AttitudeMessage, AttitudeSource, AttitudeValue, GimbalRig, 
 const UNREACHABLE_RAD: f64 = 0.035;
 /// Stretches of reported samples that are closer together than this are merged.
 const STRETCH_NS: i64 = 1_000_000_000;
-/// Reading of the vehicle's attitude starts this much earlier than that of the gimbal's.
+/// Reading of the vehicle's attitude starts this much earlier than reading of the gimbal's attitude.
 const VEHICLE_MARGIN_NS: i64 = 1_200_000_000;
 /// Times before the wanted start at which reading is tried, to find a sample that does not depend on earlier ones;
 /// after these it starts at the beginning of the log.

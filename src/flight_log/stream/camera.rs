@@ -43,7 +43,7 @@ pub(super) struct CameraStream {
     grey_levels: Arc<GreyLevels>,
     resolution_px: [usize; 2],
     gaps: GapWatch,
-    /// Last decoded image.
+    /// Image that was decoded last.
     previous: Option<Arc<GrayImage>>,
     copies: CopyJudge,
 }

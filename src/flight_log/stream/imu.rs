@@ -20,7 +20,7 @@ pub(super) struct ImuStream {
     intrinsics: ImuIntrinsics,
 }
 
-/// Uncorrected samples.
+/// Samples before the correction by the rig.
 enum ImuSource {
     /// All six values in each message.
     Together(Box<Measured<ImuSample>>),

@@ -266,7 +266,7 @@ impl WhiteNoise {
         self.blocks.push_back((number, (0..first.angles_rad.len()).map(scatter).collect()));
     }
 
-    /// White noise measured in the blocks before that of a stamp, `None` with too few readings.
+    /// White noise measured in the blocks before the block of a stamp, `None` with too few readings.
     fn at(&self, stamp_ns: i64, joint: usize) -> Option<MeasuredNoise> {
         let number = stamp_ns.div_euclid(BLOCK_NS);
         let (squares, freedom) = self

@@ -13,9 +13,9 @@ use crate::flight_log::stamps::clock::StampClock;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Content {
     Pose(MessageKind),
-    /// `geometry_msgs/msg/PointStamped`.
+    /// Position in a `geometry_msgs/msg/PointStamped`.
     Point,
-    /// `sensor_msgs/msg/NavSatFix`.
+    /// Position in a `sensor_msgs/msg/NavSatFix`.
     Fix,
 }
 

@@ -63,7 +63,7 @@ pub(in super::super) fn compressed_video(stamp_ns: i64, frame_id: &str, format: 
     out.finish()
 }
 
-/// `sensor_msgs/msg/CompressedImage`.
+/// Message `sensor_msgs/msg/CompressedImage` in CDR.
 pub(in super::super) fn compressed_image(stamp_ns: i64, frame_id: &str, format: &str, data: &[u8]) -> Vec<u8> {
     let mut out = with_header(stamp_ns, frame_id);
     out.string(format);
@@ -123,7 +123,7 @@ pub struct Odometry<'a> {
     pub frame_id: &'a str,
     /// Frame with this pose.
     pub child_frame_id: &'a str,
-    /// `frame_from_child`.
+    /// Pose `frame_from_child` of the odometry.
     pub pose: RigidTransform,
     /// Covariance of the pose: position (m), then rotations about the axes of `frame_id` (rad); zero if unknown.
     pub pose_covariance: Matrix6<f64>,
@@ -161,7 +161,7 @@ pub(in super::super) fn odometry(stamp_ns: i64, odometry: &Odometry<'_>) -> Vec<
     out.finish()
 }
 
-/// `geometry_msgs/msg/PoseStamped`.
+/// Message `geometry_msgs/msg/PoseStamped` in CDR.
 pub(in super::super) fn pose_stamped(stamp_ns: i64, frame_id: &str, pose: &RigidTransform) -> Vec<u8> {
     let mut out = with_header(stamp_ns, frame_id);
     out.f64s(pose.translation_m.as_slice());
@@ -169,7 +169,7 @@ pub(in super::super) fn pose_stamped(stamp_ns: i64, frame_id: &str, pose: &Rigid
     out.finish()
 }
 
-/// `geometry_msgs/msg/TransformStamped`.
+/// Message `geometry_msgs/msg/TransformStamped` in CDR.
 pub(in super::super) fn transform_stamped(
     stamp_ns: i64,
     frame_id: &str,
@@ -183,7 +183,7 @@ pub(in super::super) fn transform_stamped(
     out.finish()
 }
 
-/// `geometry_msgs/msg/QuaternionStamped`.
+/// Message `geometry_msgs/msg/QuaternionStamped` in CDR.
 pub(in super::super) fn quaternion_stamped(stamp_ns: i64, frame_id: &str, rotation: &UnitQuaternion<f64>) -> Vec<u8> {
     let mut out = with_header(stamp_ns, frame_id);
     put_rotation(&mut out, rotation);

@@ -58,7 +58,7 @@ pub struct MessageTimes {
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MessageType<'a> {
-    /// Such as `nav_msgs/msg/Path`.
+    /// Name of the type, such as `nav_msgs/msg/Path`.
     pub name: &'a str,
     /// Language of the definition, `ros2msg`, `protobuf` or `jsonschema`.
     pub definition_encoding: &'static str,

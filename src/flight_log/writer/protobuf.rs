@@ -18,7 +18,7 @@ enum FieldType {
 }
 
 impl FieldType {
-    /// `FieldDescriptorProto.Type`.
+    /// Number of the type in `FieldDescriptorProto.Type`.
     fn number(self) -> u64 {
         match self {
             Self::Double => 1,
@@ -168,12 +168,10 @@ fn descriptor_set(descriptor: &Descriptor, needed: &[Descriptor]) -> Vec<u8> {
     out.0
 }
 
-/// Definition of `foxglove.CompressedVideo`.
 pub(super) fn compressed_video_definition() -> Vec<u8> {
     descriptor_set(&COMPRESSED_VIDEO, &[TIMESTAMP])
 }
 
-/// Definition of `foxglove.PosesInFrame`.
 pub(super) fn poses_definition() -> Vec<u8> {
     descriptor_set(&POSES_IN_FRAME, &[TIMESTAMP, VECTOR3, QUATERNION, POSE])
 }

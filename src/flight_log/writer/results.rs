@@ -14,7 +14,7 @@ use crate::geometry::RigidTransform;
 pub struct NamedTransform {
     pub parent: String,
     pub child: String,
-    /// `parent_from_child`.
+    /// Transform `parent_from_child` of the frames.
     pub pose: RigidTransform,
 }
 
@@ -41,7 +41,6 @@ pub struct LinesAnnotation {
 /// Severity of a log line, with the numbers of ROS 2.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LogLevel {
-    /// Details for debugging.
     Debug = 10,
     Info = 20,
     /// Problem that did not stop the run.

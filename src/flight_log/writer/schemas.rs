@@ -46,18 +46,13 @@ pub(super) type Definition<'a> = (&'a str, &'a [Needed]);
 
 /// Types of a header.
 pub(super) const HEADER_NEEDS: &[Needed] = &[HEADER, TIME];
-/// `nav_msgs/msg/Path`.
 pub(super) const PATH: Definition<'_> =
     (fields!("nav_msgs/Path"), &[HEADER, TIME, STAMPED_POSE, POSE, POINT, QUATERNION]);
-/// `tf2_msgs/msg/TFMessage`.
 pub(super) const TRANSFORMS: Definition<'_> =
     (fields!("tf2_msgs/TFMessage"), &[STAMPED_TRANSFORM, HEADER, TIME, TRANSFORM, VECTOR3, QUATERNION]);
-/// `sensor_msgs/msg/PointCloud2`.
 pub(super) const POINT_CLOUD: Definition<'_> = (fields!("sensor_msgs/PointCloud2"), &[HEADER, TIME, POINT_FIELD]);
-/// `foxglove_msgs/msg/ImageAnnotations`.
 pub(super) const IMAGE_ANNOTATIONS: Definition<'_> =
     (fields!("foxglove_msgs/ImageAnnotations"), &[TIME, CIRCLE, POINTS, TEXT, COLOR, POINT2]);
-/// `rcl_interfaces/msg/Log`.
 pub(super) const LOG_LINE: Definition<'_> = (fields!("rcl_interfaces/Log"), &[TIME]);
 
 /// Fields of a message, and the types they need.

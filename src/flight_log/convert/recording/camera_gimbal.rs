@@ -133,7 +133,7 @@ impl ReadMessages {
             }
         }
         if let Some(angles) = telemetry.gimbal_attitude {
-            // Roll and pitch are those of the horizon, yaw is relative to the vehicle.
+            // Roll and pitch are relative to the horizon, yaw is relative to the vehicle.
             let numbers = [angles.roll_rad, angles.pitch_rad, angles.yaw_rad];
             if let Some(time_ns) = self.gimbal.time_of_new(frame_ns, angles.age_ms, numbers)
                 && let Some(frame_from_camera) = from_euler(numbers)

@@ -18,9 +18,9 @@ pub(super) struct RecordedImu {
     pub(super) is_of_other_device: bool,
     /// Angular velocity and specific force of one record.
     pub(super) combined: Samples<[Vector3<f64>; 2]>,
-    /// Angular velocities alone.
+    /// Angular velocities (rad/s) of a separate gyroscope.
     pub(super) gyroscope: Samples<Vector3<f64>>,
-    /// Specific forces alone.
+    /// Specific forces (m/s²) of a separate accelerometer.
     pub(super) accelerometer: Samples<Vector3<f64>>,
 }
 
@@ -29,11 +29,11 @@ pub(super) struct RecordedImu {
 pub(super) enum GimbalFrame {
     /// Levelled, with the heading of the vehicle.
     Vehicle,
-    /// North, east, down.
+    /// Axes north, east and down.
     Earth,
 }
 
-/// Attitude of a gimbal: the rotation from the camera's axes (forward, right, down) to those of a frame.
+/// Attitude of a gimbal: the rotation from the camera's axes (forward, right, down) to the axes of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct GimbalAttitude {
     pub(super) frame: GimbalFrame,
@@ -60,7 +60,7 @@ pub(super) struct Recorded {
     pub(super) format: &'static str,
     /// Prefix of the topic names: empty, or `/camera`.
     pub(super) prefix: &'static str,
-    /// IMUs by record.
+    /// IMUs by the name of their record.
     pub(super) imus: BTreeMap<String, RecordedImu>,
     /// Rotations from the vehicle's body (forward, right, down) to the earth (north, east, down).
     pub(super) attitudes: Candidates<UnitQuaternion<f64>>,

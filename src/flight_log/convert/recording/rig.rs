@@ -94,7 +94,7 @@ impl VideoFacts {
             imu_axes: if self.has_autopilot { Some(frd) } else { (!self.has_unknown_axes).then_some(flu) },
             position_m: None,
             imu_topic: imu,
-            // The video's own IMU moves with the camera on the gimbal; its axes are those of the camera, as converted.
+            // The video's own IMU moves with the camera on the gimbal; its axes are the camera's axes, as converted.
             gimbal_imu_topic: None,
             gimbal_imu_axes: (!self.has_unknown_axes).then_some(flu),
             image_topic: Some(VIDEO_TOPIC.to_owned()),

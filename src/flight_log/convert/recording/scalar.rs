@@ -14,7 +14,6 @@ pub(super) enum Scalar {
 }
 
 impl Scalar {
-    /// Size in bytes.
     pub(super) fn size(self) -> usize {
         match self {
             Self::I8 | Self::U8 => 1,

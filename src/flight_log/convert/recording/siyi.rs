@@ -92,7 +92,7 @@ fn parse(text: &str) -> Option<SiyiSubtitle> {
     Some(SiyiSubtitle { frame: frame.parse().ok()?, angles_deg, place: place(), zoom })
 }
 
-/// Degrees of `N35°21′43.1″`.
+/// Degrees of a coordinate such as `N35°21′43.1″`; `None` for another format.
 fn coordinate_deg(text: &str, [positive, negative]: [char; 2]) -> Option<f64> {
     let mut letters = text.chars();
     let sign = match letters.next()? {

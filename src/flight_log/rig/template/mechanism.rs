@@ -122,7 +122,7 @@ impl MechanismAxes {
         names.iter().zip(&self.0).map(joint).collect()
     }
 
-    /// Default names of joints: those of the axes, numbered if an axis occurs more than once.
+    /// Default names of joints: the names of the axes, numbered if an axis occurs more than once.
     pub fn default_names(&self) -> Vec<String> {
         let name = |(place, axis): (usize, &GimbalAxis)| {
             let earlier = self.0[..place].iter().filter(|other| *other == axis).count();

@@ -65,7 +65,7 @@ impl<T> Sourced<T> {
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImuTemplate {
-    /// Topic of `sensor_msgs/msg/Imu`.
+    /// Topic of messages `sensor_msgs/msg/Imu`.
     pub topic: Sourced<String>,
     /// Topic of the specific forces, if they are separate.
     pub accelerometer_topic: Option<String>,
@@ -93,7 +93,7 @@ pub enum AngleTemplate {
     Joints { topic: Sourced<String>, rate_hz: f64, names: Vec<String> },
     /// Attitude that is converted to joint angles (`gimbal.source`).
     Attitude(AttitudeTemplate),
-    /// Unmeasured.
+    /// No measurement of the joints.
     None,
 }
 

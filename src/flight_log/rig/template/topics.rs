@@ -52,8 +52,8 @@ pub struct RigChoices {
     /// Topic of the IMU, or of its gyroscope; `None` for the log's only one, and for the autopilot's of a recording that
     /// also has the camera's.
     pub imu_topic: Option<String>,
-    /// Topic of an IMU in the camera's housing on a gimbal, or of its gyroscope; `None` for that of a converted recording,
-    /// or without one.
+    /// Topic of an IMU in the camera's housing on a gimbal, or of its gyroscope; `None` for the topic of a converted
+    /// recording, or without such an IMU.
     pub gimbal_imu_topic: Option<String>,
     /// Its axes in the camera, forward being the viewing direction; `None` if unknown.
     pub gimbal_imu_axes: Option<BodyAxes>,
@@ -65,7 +65,7 @@ pub struct RigChoices {
     pub joint_names: Vec<String>,
     /// Attitude topic of the gimbal with the entries of `gimbal.source`, to compute joint angles from.
     pub attitude: Option<(String, Vec<(String, String)>)>,
-    /// Measured noise densities.
+    /// Noise densities of the IMU, if they were measured.
     pub noise: Option<ImuNoise>,
 }
 

@@ -199,7 +199,7 @@ fn camera_gimbal(record: &Record<'_>, recorded: &mut Recorded) -> Result<(), &'s
 
 /// Reads the vehicle's position in the log of `AP_CameraGimbal`, which has no records of a receiver.
 fn camera_position(record: &Record<'_>, recorded: &mut Recorded) -> Result<(), &'static str> {
-    // Positions of an autopilot's own log are those of its receiver and of its filter.
+    // An autopilot's own log has the positions of its receiver and of its filter.
     if record.raw("BootMS").is_none() {
         return Err("not read");
     }

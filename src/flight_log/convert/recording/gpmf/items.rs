@@ -75,7 +75,8 @@ impl Item<'_> {
         self.data.chunks_exact(scalar.size()).filter_map(number).collect()
     }
 
-    /// Numbers of each sample divided by their scales; `letters` are those of `TYPE`. Samples with text are left out.
+    /// Numbers of each sample divided by their scales; `letters` is the content of `TYPE`. Samples with text are left
+    /// out.
     pub(super) fn rows(&self, letters: &str, scales: &[f64]) -> impl Iterator<Item = Vec<f64>> {
         let fields: Vec<(Scalar, f64)> = match self.kind {
             b'?' => letters.bytes().map_while(scalar).collect(),

@@ -1,4 +1,4 @@
-//! Telemetry that a `GoPro` Karma drone adds to that of its camera, about four times a second.
+//! Telemetry that a `GoPro` Karma drone adds to the camera's telemetry, about four times a second.
 
 use super::super::mp4::Payload;
 use super::super::recorded::{Recorded, STANDARD_GRAVITY_M_PER_S2, finite, from_euler, nanoseconds};

@@ -107,7 +107,6 @@ impl UnitFormat {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum UnitKind {
     RandomAccess,
-    /// Sequence parameter set.
     ParameterSet,
     Delimiter,
     Other,

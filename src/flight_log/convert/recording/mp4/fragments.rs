@@ -3,7 +3,7 @@
 use super::boxes::{child, children, u32_at, u64_at};
 use super::track::{MovieTrack, Sample};
 
-/// Defaults of a track's samples (`trex`, replaced by those of `tfhd`).
+/// Defaults of a track's samples (box `trex`, replaced by the defaults in `tfhd`).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Defaults {
     track: u32,
@@ -49,7 +49,7 @@ impl Fragments {
 
     /// Adds the samples of a `traf` box; returns the byte behind its data, `None` if the box is damaged.
     ///
-    /// Data begin relative to the fragment or behind those of the track before (`[moof_start, behind]`).
+    /// Data begin relative to the fragment or behind the data of the track before (`[moof_start, behind]`).
     fn add_track(&mut self, traf: &[u8], [moof_start, behind]: [u64; 2], tracks: &mut [MovieTrack<'_>]) -> Option<u64> {
         let header = TrackHeader::read(child(traf, b"tfhd")?, &self.defaults)?;
         let place = tracks.iter().position(|track| track.id == header.defaults.track);

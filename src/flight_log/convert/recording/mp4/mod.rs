@@ -49,7 +49,7 @@ pub(super) struct Video {
     has_reordered_pictures: bool,
 }
 
-/// Payload of telemetry.
+/// Payload of a telemetry sample with its time.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Payload {
     /// Nanoseconds from the start of the video to its first sample, and to the next payload.
@@ -62,7 +62,7 @@ pub(super) struct Payload {
 #[derive(Debug)]
 pub(super) struct Movie {
     pub(super) video: Video,
-    /// `GoPro` telemetry.
+    /// Telemetry of `GoPro` (GPMF).
     pub(super) telemetry: Vec<Payload>,
     /// Camera motion metadata (CAMM).
     pub(super) motion: Vec<Payload>,
@@ -192,7 +192,7 @@ fn place(sample: &Sample, file_bytes: usize) -> Option<(usize, usize)> {
     (length > 0 && start.checked_add(length)? <= file_bytes).then_some((start, length))
 }
 
-/// Adds the samples of the fragments to those of the tables.
+/// Adds the samples of the fragments to the samples of the tables.
 fn add_fragments(
     file: &LogFile,
     boxes: &[FileBox],

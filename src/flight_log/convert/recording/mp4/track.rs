@@ -14,7 +14,7 @@ pub(super) struct Sample {
     pub(super) duration_ns: i64,
 }
 
-/// Relation of a track's times to those of the movie.
+/// Relation of a track's times to the movie's times.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct TrackClock {
     /// Units of the track's times in one second.

@@ -152,7 +152,8 @@ impl Component {
         if self.is_autopilot() { name.to_owned() } else { format!("{name} of component {}", self.0) }
     }
 
-    /// Preference for a measurement of the vehicle: those of its autopilot come before those of its other components.
+    /// Preference for a measurement of the vehicle: measurements of its autopilot come before measurements of its other
+    /// components.
     fn preference(self, rank: u8) -> Preference {
         if self.is_autopilot() { (rank, 0) } else { (rank + OTHER_COMPONENTS, u16::from(self.0)) }
     }

@@ -15,7 +15,7 @@ const MESSAGE_HEADER_BYTES: usize = 3;
 const CHAIN: usize = 4;
 
 pub(super) struct Message<'a> {
-    /// Type letter.
+    /// Letter of the message's type.
     pub(super) kind: u8,
     pub(super) content: &'a [u8],
     /// Position after the message.

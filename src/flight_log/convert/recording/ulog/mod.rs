@@ -157,7 +157,7 @@ fn is_read(name: &str) -> bool {
     .contains(&name)
 }
 
-/// Data message.
+/// Data message of a subscription.
 struct Record<'a> {
     subscription: &'a Subscription,
     layout: &'a MessageLayout,
