@@ -77,7 +77,7 @@ impl FramePainter for Painter {
     }
 }
 
-/// An egui context without a window; it uses egui's embedded fonts, never those of the system.
+/// An egui context without a window; it uses egui's embedded fonts, never the system's fonts.
 pub struct Headless {
     context: egui::Context,
     options: HeadlessOptions,

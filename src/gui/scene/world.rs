@@ -165,7 +165,7 @@ pub(super) struct LaneView<'a> {
 }
 
 impl<'a> LaneView<'a> {
-    /// `run` is the first run of the recording; without ground truth its world is that of the scene.
+    /// `run` is the first run of the recording; without ground truth its world is the world of the scene.
     pub(super) fn new(number: usize, lane: &'a TrajectoryLane, run: Option<&RunRecord>, cursor_ns: i64) -> Self {
         let shown = lane.track.samples().partition_point(|sample| sample.stamp_ns <= cursor_ns);
         Self { number, lane, shown, world_from_own: lane.world_from_own(run) }
@@ -347,7 +347,8 @@ impl<'a> WorldBuilder<'a> {
         self.scene.dots.push(Dot { position_m, color, radius });
     }
 
-    /// Draws the landmarks of the step at the cursor, and paler those of earlier steps; viridis over their height.
+    /// Draws the landmarks of the step at the cursor, and paler the landmarks of earlier steps; viridis over their
+    /// height.
     fn landmarks(&mut self, view: &RunView<'_>) {
         let steps = &view.run.steps[..view.shown];
         let Some(now) = view.step() else { return };

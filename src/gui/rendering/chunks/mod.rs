@@ -55,7 +55,7 @@ pub struct Tessellation {
 impl Tessellation {
     /// Tessellates the shapes of a frame, in the order of painting.
     ///
-    /// Together the meshes give the same image as those of [`Context::tessellate`].
+    /// Together the meshes give the same image as the meshes of [`Context::tessellate`].
     pub fn chunks(&mut self, context: &Context, shapes: Vec<ClippedShape>, pixels_per_point: f32) -> Vec<Arc<Chunk>> {
         let setting = Setting {
             pixels_per_point,

@@ -59,7 +59,7 @@ impl Canvas {
         PixelRect { at, size: [0, 1].map(|axis| TILE_PX[axis].min(self.size_px[axis] - at[axis])) }
     }
 
-    /// Updates the image; the result equals that of painting it completely.
+    /// Updates the image; the result is the same as painting it completely.
     pub(super) fn update(
         &mut self,
         chunks: &[Arc<PreparedChunk>],

@@ -39,7 +39,7 @@ pub(super) struct FontGlyph {
     pub(super) glyph: u16,
     /// Width of the glyph in em.
     pub(super) width: f32,
-    /// Size of the font relative to that of the text.
+    /// Size of the font relative to the size of the text.
     pub(super) scale: f32,
 }
 
