@@ -6,8 +6,8 @@ use crate::estimator::allocated_bytes;
 
 /// Upper triangle `R` in single precision of the information matrix `RᵀR`.
 ///
-/// The dynamic range of a factor is the square root of that of the information, so that single precision represents
-/// weakly and strongly observable directions together. A step's factor takes 1.2 kB at most.
+/// The dynamic range of a factor is the square root of the dynamic range of the information, so that single precision
+/// represents weakly and strongly observable directions together. A step's factor takes 1.2 kB at most.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PackedFactor {
     columns: usize,

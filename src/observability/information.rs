@@ -11,7 +11,7 @@ pub struct InformationRate {
     pub duration_s: f64,
     /// Motions in the order of the entries of [`ParameterRate::by_motion`].
     pub motions: Vec<Motion>,
-    /// In column order.
+    /// Information rates in column order.
     pub parameters: Vec<ParameterRate>,
 }
 

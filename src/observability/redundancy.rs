@@ -50,8 +50,8 @@ impl Redundancy {
 
     /// Parameters with the same motion as a redundant parameter, largest weight first; empty for any other parameter.
     ///
-    /// The weights are those of the parameter's unit vector projected on the span, which do not depend on the choice of
-    /// basis.
+    /// The weights are the entries of the parameter's unit vector projected on the span, which do not depend on the
+    /// choice of basis.
     pub fn partners(&self, parameter: ParameterId) -> Vec<ParameterId> {
         let Some(column) = self.column(parameter) else { return Vec::new() };
         let (own, weight) = (self.projector[(column, column)], |other: usize| self.projector[(column, other)].abs());
@@ -72,7 +72,8 @@ fn only_parameterization(rank: &RankReport) -> super::Deficit {
     super::Deficit { parameterization, joints: 0, absorbed: 0, motion: 0 }
 }
 
-/// Unit directions in closed form as weights by column of the rank report; those of free joint angles are not redundant.
+/// Unit directions in closed form as weights by column of the rank report; directions of free joint angles are not
+/// redundant.
 fn closed_form(report: &StepReport, rank: &RankReport) -> Vec<Vec<f64>> {
     let Some(chain) = chain_of_step(report, rank) else { return Vec::new() };
     let parameters = chain.parameters();

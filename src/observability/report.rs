@@ -118,7 +118,7 @@ impl RankReport {
         self.known.iter().filter(|known| known.is_claimed()).count()
     }
 
-    /// The largest [`KnownDirection::spurious_gain`].
+    /// Largest [`KnownDirection::spurious_gain`] of all directions.
     pub fn spurious_gain(&self) -> f64 {
         self.known.iter().map(|known| known.spurious_gain).fold(0.0, f64::max)
     }
@@ -137,7 +137,7 @@ impl RankReport {
 }
 
 impl CalibrationDirection {
-    /// `null` or `uninformed`.
+    /// Kind for files: `null` or `uninformed`.
     pub fn kind(&self) -> &'static str {
         if self.structural { "null" } else { "uninformed" }
     }
@@ -159,8 +159,8 @@ fn of_vec<T>(vec: &Vec<T>) -> usize {
     allocated_bytes(vec.capacity() * size_of::<T>())
 }
 
-/// Parameter with the second largest weight in a direction, if it or the leading one belongs to the shutter, the
-/// intrinsics of a camera or those of the IMU: a joint change of both hardly changes the measurements.
+/// Parameter with the second largest weight in a direction, if it or the leading one belongs to the shutter, to the
+/// intrinsics of a camera or to the intrinsics of the IMU: a joint change of both hardly changes the measurements.
 pub(super) fn trades_with(parameters: &[ParameterId], direction: &CalibrationDirection) -> Option<ParameterId> {
     const SMALLEST_RATIO: f64 = 0.3;
     let leading = direction.leading(parameters)?;

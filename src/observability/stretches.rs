@@ -43,9 +43,9 @@ pub struct UsefulStretch {
 /// Chosen stretches with the predicted result of a calibration from them alone.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UsefulStretches {
-    /// In time order.
+    /// Chosen stretches in time order.
     pub stretches: Vec<UsefulStretch>,
-    /// Predicted σ of each column, divided by that of the whole flight.
+    /// Predicted σ of each column, divided by the σ of the whole flight.
     pub ratios: Vec<f64>,
 }
 
@@ -68,8 +68,8 @@ impl InformationTrack {
         sigmas(sum)
     }
 
-    /// The stretches of together `total_s` seconds, one to four of equal length, with the smallest largest ratio of σ to
-    /// that of the whole flight. `None` without information, or if the flight or `total_s` is too short.
+    /// Stretches of at most `total_s` seconds in total, one to four of equal length, that minimize the largest ratio of
+    /// σ to the σ of the whole flight. `None` without information, or if the flight or `total_s` is too short.
     pub fn useful_stretches(&self, total_s: f64) -> Option<UsefulStretches> {
         let end_ns = *self.stamps_ns.last()?;
         let whole = sigmas(self.information.last()?.clone())?;
@@ -178,7 +178,7 @@ mod tests {
         let found = track().useful_stretches(12.0).expect("the flight informs");
         assert_eq!(found.stretches.len(), 2);
         for (stretch, informed_s) in found.stretches.iter().zip([10.0, 40.0]) {
-            // The first second of a stretch is that of the initialization.
+            // The first second of a stretch is used by the initialization.
             assert!(seconds_from_ns(stretch.start_ns) + 1.0 <= informed_s + 0.11, "{stretch:?}");
             assert!(seconds_from_ns(stretch.end_ns) >= informed_s + 3.9, "{stretch:?}");
         }

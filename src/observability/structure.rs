@@ -2,7 +2,8 @@
 //! angles, each with its reason.
 //!
 //! The paper claims six degenerate columns of the classical chain (§4.5): `d`, `a`, `α` and `θ` of the last link and
-//! `d` and `θ` of the first one. It proves that of `d` (Eqs. 11–17) and fixes the others by the forms of Eqs. 19 and
+//! `d` and `θ` of the first one. It proves the degeneracy of `d` (Eqs. 11–17) and fixes the others by the forms of Eqs.
+//! 19 and
 //! 20. Errors of the print do not affect the claim (docs/mathematics.md, section 2): Eq. 12 has a minus before the
 //!     lever-arm block where a plus belongs (left convention; the proof uses other columns only), and Eq. 18 has `−cos
 //!     β` in the lower right corner of a rotation, while Eq. 19 needs `+cos β`. Exchanging the rotations of α and β to
@@ -188,7 +189,7 @@ impl Measured<'_> {
             })
             .map(|(loss, direction)| {
                 let direction = direction.select_rows(kept);
-                // The chain's columns come first; those of other cameras follow and are zero.
+                // The chain's columns come first; columns of other cameras follow and are zero.
                 let direction = direction.resize_vertically(scale.len(), 0.0).component_div(scale).normalize();
                 let response = (self.block * &direction).norm();
                 let null_space_fraction = self.null_space.tr_mul(&direction).norm();

@@ -36,7 +36,8 @@ fn window(random: &mut Random, parameters: &[ParameterId]) -> Linearization {
         let row = 66 + 15 * (FRAMES - 1) + index;
         jacobian[(row, JOINTS_START + index)] = 115.0;
     }
-    // Four gauge directions: each pose's last four columns repeat those of the other poses with the opposite sign.
+    // Four gauge directions: each pose's last four columns repeat the last four columns of the other poses with the
+    // opposite sign.
     for gauge in 0..4 {
         let last = POSES_START + 6 * (FRAMES - 1) + 2 + gauge;
         let mut sum = nalgebra::DVector::zeros(jacobian.nrows());

@@ -250,7 +250,7 @@ fn known_and_measured_redundancy_agree() {
     assert!(spurious_gains.iter().filter(|known| known.is_claimed()).count() >= 3, "{spurious_gains:?}");
     let rig_prior = DMatrix::identity(24, mixed.jacobian.ncols()) * 100.0;
     assert!(claimed(&rig_prior, 24).iter().all(|known| known.spurious_gain < 1e-3));
-    // The minimal parameterization has no null direction; without encoders it has those of its offsets.
+    // The minimal parameterization has no null direction; without encoders it has the null directions of its offsets.
     let minimal = Chain::from_classical(&classical, Parameterization::Minimal);
     let known = |joints_free: bool| {
         let linearization = window.linearize(&minimal, joints_free);
