@@ -10,7 +10,7 @@ use crate::geometry::{RigidTransform, so3, vertical_angle, wrap_angle};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StampedPose {
     pub stamp_s: f64,
-    /// `world_from_body`.
+    /// Pose `world_from_body` at the stamp.
     pub pose: RigidTransform,
 }
 
@@ -48,7 +48,7 @@ impl Serialize for TrajectoryAlignment {
 /// Statistics of a series of errors, named as in evo.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ErrorStatistics {
-    /// Number of errors.
+    /// Number of errors in the sums.
     #[serde(skip)]
     pub count: usize,
     pub rmse: f64,
@@ -75,7 +75,7 @@ impl ErrorStatistics {
 /// Similarity transform from estimate to reference: `reference ≈ scale · rotation · estimate + translation`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AlignmentTransform {
-    /// `reference_from_estimate`.
+    /// Rigid part of `reference_from_estimate`.
     pub rigid: RigidTransform,
     /// Scale factor of the estimate's lengths, without unit.
     pub scale: f64,

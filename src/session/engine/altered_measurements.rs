@@ -33,7 +33,7 @@ impl Default for AlteredMeasurements {
 }
 
 impl AlteredMeasurements {
-    /// Adds the changes of a fork to those of its parent.
+    /// Adds the changes of a fork to the changes of its parent.
     pub(super) fn add(&mut self, other: Self) {
         self.dropped.extend(other.dropped);
         self.disabled_cameras.extend(other.disabled_cameras);

@@ -23,7 +23,7 @@ const SNAPSHOT_BUDGET_DIVISOR: usize = 2;
 #[derive(Clone, Debug)]
 pub struct Computation {
     recording: Arc<Recording>,
-    /// By [`RunRecord::id`].
+    /// Snapshots of each run by [`RunRecord::id`].
     histories: BTreeMap<u64, Arc<History>>,
 }
 

@@ -20,7 +20,7 @@ use crate::sensors::{CameraRig, GrayImage, Rig};
 const SECTIONS: [usize; 2] = [2, 10];
 /// Length of a section in seconds.
 const SECTION_S: f64 = 5.0;
-/// Larger time offsets in seconds are those of another clock.
+/// Time offset in seconds from which on the stamps belong to another clock.
 const ANOTHER_CLOCK_S: f64 = 1.0;
 /// Standard deviation of a tracked feature's position, per coordinate, in pixels.
 const PIXEL_SIGMA_PX: f64 = 0.5;
@@ -60,8 +60,8 @@ pub fn image_rotations(log: &Arc<FlightLog>, rig: &Rig) -> Vec<ImageRotation> {
     found.into_iter().flatten().collect()
 }
 
-/// First stamp and duration of a camera's images in camera time, in seconds: those of the log, unless the time offset of
-/// the rig is that of another clock.
+/// First stamp and duration of a camera's images in camera time, in seconds: start and duration of the log, unless the
+/// time offset of the rig is an offset between two clocks.
 fn span_of(log: &Arc<FlightLog>, rig: &Rig, camera: &CameraRig) -> (f64, f64) {
     let of_log = (0.0, seconds_from_ns(log.duration_ns()));
     if camera.timeshift_cam_imu_s.abs() < ANOTHER_CLOCK_S {

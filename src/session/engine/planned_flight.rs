@@ -46,7 +46,7 @@ mod tests {
         let minimal = of("minimal:pixel-noise=2").unwrap();
         assert_eq!(minimal.chain.parameters().len(), 18);
         assert!((minimal.pixel_sigma_px - 0.5).abs() < 1e-12);
-        // Ten readings per image interval of 50 ms: between those of a line and of a parabola.
+        // Ten readings per image interval of 50 ms: the noise lies between the noise of a line and of a parabola.
         let JointKnowledge::Encoder(sigma_rad) = minimal.encoders else { panic!("the rig has encoders") };
         let ratio = sigma_rad / 0.5_f64.to_radians();
         assert!(ratio > 0.1_f64.sqrt() && ratio < 0.5 * (0.1_f64.sqrt() + 0.225_f64.sqrt()), "{ratio}");

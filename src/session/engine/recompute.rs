@@ -31,7 +31,7 @@ pub(in crate::session) enum Detail {
 
 #[derive(Clone, Debug)]
 pub(in crate::session) struct RecomputeRequest {
-    /// [`RunRecord::id`](crate::session::RunRecord::id).
+    /// Id of the run, [`RunRecord::id`](crate::session::RunRecord::id).
     pub(in crate::session) run: u64,
     pub(in crate::session) history: Arc<History>,
     pub(in crate::session) step: usize,

@@ -17,8 +17,8 @@ pub(super) struct ShiftedImu {
 }
 
 impl ShiftedImu {
-    /// Samples between the shifted stamps of the previous image and this one, and those after it; `imu` and `after` are
-    /// those of the stamps without a shift.
+    /// Samples between the shifted stamps of the previous image and this one, and the samples after it; `imu` and
+    /// `after` are the same samples for stamps without a shift.
     pub(super) fn cut(
         &mut self,
         imu: &[ImuSample],

@@ -19,7 +19,6 @@ impl Stopwatch {
         Self { begin: Instant::now() }
     }
 
-    /// Milliseconds since [`Stopwatch::start`].
     pub fn elapsed_ms(&self) -> f64 {
         self.begin.elapsed().as_secs_f64() * 1e3
     }

@@ -24,7 +24,7 @@ pub(super) struct CameraTracker {
     gimbal_imu: Option<GimbalGyroscope>,
     /// True after the first image.
     tracking: bool,
-    /// Ground truth that replaces that of the log; `None` keeps the log's.
+    /// Ground truth in place of the log's; `None` keeps the log's.
     ground_truth: Option<Arc<PoseTrack>>,
 }
 

@@ -13,7 +13,7 @@ use crate::session::plan::SessionError;
 /// Longest time that a window waits for an image or a recomputed step; the next image of a video is decoded within it, so
 /// that playback shows every image.
 pub(super) const WINDOW_WAIT: Duration = Duration::from_millis(25);
-/// Number of decoded images that are kept: those of all panels of a window.
+/// Number of decoded images that are kept, enough for all panels of a window.
 const DELIVERED: usize = 8;
 
 /// Decoding state of a frame's image.

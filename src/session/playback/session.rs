@@ -20,7 +20,7 @@ use crate::session::record::{Recording, SolverPosition};
 /// A step whose factor rows are shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct FactorRowsView {
-    /// [`RunRecord::id`](crate::session::RunRecord::id).
+    /// Id of the run, [`RunRecord::id`](crate::session::RunRecord::id).
     pub(super) run: u64,
     pub(super) step: usize,
 }

@@ -114,7 +114,7 @@ impl FlightVerdicts {
 
     /// Table of the parameters at the end of the steps that were read, in groups, otherwise in column order.
     ///
-    /// `advice` is that of [`Self::ranked_step`]; without it no motion is suggested for the chain.
+    /// `advice` belongs to [`Self::ranked_step`]; without it no motion is suggested for the chain.
     pub fn table(&self, names: &ParameterNames, advice: Option<&Advice>) -> Vec<FlightParameter> {
         let Some(last) = &self.last else { return Vec::new() };
         let calibration = &last.report.calibration;

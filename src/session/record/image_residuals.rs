@@ -84,7 +84,7 @@ impl ImageResiduals {
         residuals
     }
 
-    /// Residuals of a flight: those of every image in the step of that image.
+    /// Residuals of a flight: for every image, the residuals in the step of this image.
     pub(super) fn of_steps<'a>(steps: impl Iterator<Item = &'a StepRecord>) -> Self {
         let mut residuals = Self::default();
         for step in steps {
@@ -114,7 +114,7 @@ impl ImageResiduals {
     fn add(&mut self, observation: &ObservationReport, before: Option<&ObservationReport>) {
         let Some(residual_px) = observation.residual_after_px.filter(|it| it.norm().is_finite()) else { return };
         let motion_px = before.map(|before| observation.measured_px - before.measured_px);
-        // The direction of a shorter motion is that of the noise.
+        // A shorter motion has a random direction.
         let direction = motion_px.filter(|motion_px| motion_px.norm() > 1.0).map(|motion_px| motion_px.normalize());
         let weight = observation.robust_weight.clamp(MIN_WEIGHT, 1.0);
         let along = direction.map_or_else(AlongMotion::default, |direction| {

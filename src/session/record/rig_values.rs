@@ -108,7 +108,7 @@ fn has_imu_columns(estimate: &CalibrationEstimate) -> bool {
     estimate.parameters.iter().any(|parameter| is_intrinsic(parameter.part))
 }
 
-/// A rig's values of those of `parameters` that belong to the IMU on the gimbal: pose relative to `given`, time offset.
+/// A rig's values of the `parameters` that belong to the IMU on the gimbal: pose relative to `given`, time offset.
 fn gimbal_imu_columns(rig: &Rig, given: &Rig, parameters: &[ParameterId]) -> Vec<(ParameterId, f64)> {
     let (Some(imu), Some(given)) = (&rig.gimbal_imu, &given.gimbal_imu) else { return Vec::new() };
     let rotation = so3::log(&(given.camera_from_imu.rotation.inverse() * imu.camera_from_imu.rotation));

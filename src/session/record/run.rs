@@ -266,7 +266,7 @@ impl RunRecord {
         false
     }
 
-    /// Computed fraction of the run, all passes together, from 0 to 1; `duration_ns` is that of the log.
+    /// Computed fraction of the run, all passes together, from 0 to 1; `duration_ns` is the duration of the log.
     pub fn computed_fraction(&self, duration_ns: i64) -> f64 {
         let passes = self.spec.passes.max(1);
         let before = match self.running_pass() {

@@ -57,7 +57,7 @@ pub struct TrajectoryAccuracy {
 pub struct RelativeAccuracy {
     /// Path length of a sub-trajectory in metres.
     pub delta_m: f64,
-    /// Number of sub-trajectories.
+    /// Number of sub-trajectories of this length.
     pub pairs: usize,
     /// Root mean square of the translation error.
     pub translation_rmse_m: f64,

@@ -79,8 +79,8 @@ impl TrajectoryLane {
         Self { label, source, track, length_m, evaluation, accuracy_missing, id }
     }
 
-    /// Transform from the trajectory's world to that of the scene: the alignment with the ground truth; without one,
-    /// the alignment with a run at the first common frame.
+    /// Transform from the trajectory's world to the world of the scene: the alignment with the ground truth; without
+    /// one, the alignment with a run at the first common frame.
     pub fn world_from_own(&self, run: Option<&RunRecord>) -> RigidTransform {
         let onto_run = || {
             let run = run.filter(|run| run.alignment.is_none())?;
@@ -96,7 +96,7 @@ impl TrajectoryLane {
     /// before a stamp; `None` without one within 0.5 s.
     pub fn error_m(&self, stamp_ns: i64) -> Option<f64> {
         let now_s = seconds_from_ns(stamp_ns);
-        // Stamps in seconds are rounded in the same way as those of the pairs.
+        // Stamps in seconds are rounded in the same way as the stamps of the pairs.
         let index = self.evaluation.pairs.partition_point(|(estimate, _)| estimate.stamp_s <= now_s).checked_sub(1)?;
         let recent = now_s - self.evaluation.pairs[index].0.stamp_s <= seconds_from_ns(MAX_POSITION_AGE_NS);
         self.evaluation.error_m(index).filter(|_| recent)

@@ -79,7 +79,7 @@ impl WarningLine<'_> {
     }
 }
 
-/// Lines of all warnings, those of the log first, each source in the order of the first stamps.
+/// Lines of all warnings, the log's warnings first, each source in the order of the first stamps.
 pub fn warning_lines(recording: &Recording) -> Vec<WarningLine<'_>> {
     let mut lines = log_warning_lines(&recording.warnings);
     lines.extend(recording.runs.iter().flat_map(run_warning_lines));

@@ -26,7 +26,7 @@ fn covariances_are_those_of_the_rows_of_the_window() {
         for (step, linearization) in kept {
             let covariance = step.report.newest_pose_covariance.unwrap().0;
             for (place, expected) in sigmas_of_rows(linearization).into_iter().enumerate() {
-                // The covariance is that of the linearization before the last iteration.
+                // The covariance belongs to the linearization before the last iteration.
                 let ratio = covariance[(place, place)].sqrt() / expected;
                 assert!((ratio - 1.0).abs() < 0.02, "{spec} {} component {place}: {ratio}", step.report.stamp_ns);
             }

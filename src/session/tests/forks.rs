@@ -366,7 +366,7 @@ fn a_session_stops_at_breakpoints_and_forks_there() {
         assert_eq!(bits(original), bits(twin), "step {number}");
         assert_eq!(other.report.calibration.parameters.len(), if number < at { 18 } else { 24 });
     }
-    // Steps of a fork can be recomputed as well, including those of its parent.
+    // Steps of a fork can be recomputed as well, including the steps of its parent.
     for number in [at - 3, at, parent.steps.len() - 1] {
         let (_, again) = session.computation().recompute(2, number, 1).pop().unwrap();
         assert_eq!(bits(&again), bits(&classical.steps[number]));

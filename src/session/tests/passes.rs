@@ -1,4 +1,5 @@
-//! Runs of several passes: each pass starts from the findings of the previous one, and its σ stay those of one flight.
+//! Runs of several passes: each pass starts from the findings of the previous one, and its σ stay as large as the σ of
+//! one flight.
 
 use std::sync::Arc;
 use std::sync::mpsc::sync_channel;
