@@ -41,7 +41,7 @@ mod tests {
     use crate::gui::samples::{FRAME_PERIOD_NS, sample_recording};
 
     #[test]
-    fn the_next_picture_is_due_at_the_next_step() {
+    fn the_next_frame_is_due_at_the_next_step() {
         let recording = &sample_recording();
         let stamp_ns = recording.runs[0].steps[40].report.stamp_ns;
         let period = Duration::from_nanos(FRAME_PERIOD_NS as u64);

@@ -66,7 +66,7 @@ impl Panel for ImagePanel {
             return;
         };
         let size = ui.available_size() - vec2(0.0, 2.0 * LINE_HEIGHT + 2.0 * ui.spacing().item_spacing.y);
-        self.picture_ui(ui, context, &run.spec.label, &model, size);
+        self.content_ui(ui, context, &run.spec.label, &model, size);
         let moved = context.moved_chain(model.stamp_ns).is_some();
         self.legend_ui(ui, context, moved);
         caption_ui(ui, context, &model);
@@ -105,7 +105,7 @@ impl ImagePanel {
             return;
         };
         let size = ui.available_size();
-        self.picture_ui(ui, context, &run.spec.label, &model, size);
+        self.content_ui(ui, context, &run.spec.label, &model, size);
     }
 
     /// Draws the legend of the marks in one line.
@@ -116,7 +116,7 @@ impl ImagePanel {
     }
 
     /// Draws the image with its marks in a size in points.
-    fn picture_ui(&mut self, ui: &mut Ui, context: &mut PanelContext<'_>, label: &str, model: &ImageModel, size: Vec2) {
+    fn content_ui(&mut self, ui: &mut Ui, context: &mut PanelContext<'_>, label: &str, model: &ImageModel, size: Vec2) {
         let (area, response) = ui.allocate_exact_size(size.max(Vec2::splat(16.0)), Sense::click_and_drag());
         let name = format!("Image of {label}");
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &name));

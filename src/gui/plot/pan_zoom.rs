@@ -7,7 +7,7 @@ use crate::gui::theme::Theme;
 /// Minimum side in points of a box that is selected with the pointer.
 const MIN_BOX: f32 = 8.0;
 
-/// The visible region of an image or matrix ("picture").
+/// The visible region of an image or matrix, the content.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::gui) struct PanZoom {
     /// Size relative to the fitted size.
@@ -23,7 +23,7 @@ impl Default for PanZoom {
 }
 
 impl PanZoom {
-    /// Rectangle of the whole picture around the centre of `area`, given its fitted size; it may be larger than the
+    /// Rectangle of the whole content around the centre of `area`, given its fitted size; it may be larger than the
     /// area.
     pub(in crate::gui) fn place(self, area: Rect, fitted: Vec2) -> Rect {
         let size = fitted * self.zoom;
@@ -62,7 +62,7 @@ impl PanZoom {
         self.centre = self.centre.clamp(Vec2::splat(room), Vec2::splat(1.0 - room));
     }
 
-    /// Zooms by a factor; the position `anchor`, in fractions of the picture, stays where it is.
+    /// Zooms by a factor; the position `anchor`, in fractions of the content, stays where it is.
     fn zoom_about(&mut self, anchor: Vec2, factor: f32, max_zoom: f32) {
         let zoom = (self.zoom * factor).clamp(1.0, max_zoom);
         self.centre = anchor + (self.centre - anchor) * (self.zoom / zoom);
@@ -82,7 +82,7 @@ impl PanZoom {
         let Some((origin, pointer)) = origin.zip(response.interact_pointer_pos()) else { return };
         let selected = Rect::from_two_pos(origin, pointer).intersect(area);
         if dragged && !complete {
-            // Drawn above the picture, which is painted later.
+            // Drawn above the content, which is painted later.
             let layer = LayerId::new(Order::Foreground, stored);
             let painter = ui.ctx().layer_painter(layer).with_clip_rect(area);
             let line = Stroke::new(1.0, theme.accent);
@@ -104,11 +104,11 @@ mod tests {
     use super::*;
     use crate::gui::theme::ThemeName;
 
-    /// A picture of 400 × 300 points that fills its area.
+    /// Content of 400 × 300 points that fills its area.
     fn harness() -> Harness<'static, PanZoom> {
         let draw = |ui: &mut Ui, view: &mut PanZoom| {
             let area = Rect::from_min_size(pos2(10.0, 10.0), vec2(400.0, 300.0));
-            let response = ui.interact(area, ui.unique_id().with("picture"), Sense::click_and_drag());
+            let response = ui.interact(area, ui.unique_id().with("content"), Sense::click_and_drag());
             view.navigate(ui, &Theme::of(ThemeName::Dark), area, area.size(), &response, 16.0);
         };
         Harness::builder().with_size([500.0, 400.0]).build_ui_state(draw, PanZoom::default())
@@ -150,7 +150,7 @@ mod tests {
         let area = Rect::from_min_size(pos2(10.0, 10.0), vec2(400.0, 300.0));
         let place = view.place(area, area.size());
         let under = (pointer - place.min) / place.size();
-        assert!((under - vec2(0.25, 0.25)).length() < 1e-3, "a quarter of the picture is still under it: {under:?}");
+        assert!((under - vec2(0.25, 0.25)).length() < 1e-3, "a quarter of the content is still under it: {under:?}");
         scroll(&mut harness, pointer, vec2(-40.0, 0.0), Modifiers::NONE);
         assert!(harness.state().zoom == view.zoom && harness.state().centre.x > view.centre.x);
         // In one frame: a frame of the test takes a quarter of a second.

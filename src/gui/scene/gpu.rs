@@ -11,7 +11,7 @@ use wgpu::util::DeviceExt as _;
 
 use super::layout::{Corner, Disc, ImageCorner, SceneDrawing, Segment};
 use super::pipelines::{COLOR_FORMAT, DEPTH_FORMAT, PipelineMaker, SAMPLES};
-use crate::gui::rendering::picture_copy::PictureCopy;
+use crate::gui::rendering::image_copy::ImageCopy;
 use crate::sensors::GrayImage;
 
 /// Vertices of the two triangles of a segment.
@@ -68,7 +68,7 @@ struct SceneRenderer {
     face_pipeline: wgpu::RenderPipeline,
     segment_pipeline: wgpu::RenderPipeline,
     disc_pipeline: wgpu::RenderPipeline,
-    copy: PictureCopy,
+    copy: ImageCopy,
     uniform_layout: wgpu::BindGroupLayout,
     canvases: egui::IdMap<Canvas>,
 }
@@ -102,7 +102,7 @@ impl SceneRenderer {
                 count: None,
             }],
         });
-        let copy = PictureCopy::new(device, target_format);
+        let copy = ImageCopy::new(device, target_format);
         let pipelines =
             PipelineMaker { device, shader: &shader, uniform_layout: &uniform_layout, texture_layout: copy.layout() };
         let per_instance = wgpu::VertexStepMode::Instance;
@@ -273,7 +273,7 @@ impl SceneRenderer {
 }
 
 impl Canvas {
-    fn new(device: &wgpu::Device, drawing: &Arc<SceneDrawing>, copy: &PictureCopy) -> Self {
+    fn new(device: &wgpu::Device, drawing: &Arc<SceneDrawing>, copy: &ImageCopy) -> Self {
         let size_px = drawing.size_px;
         let target = |label, format, sample_count, usage| {
             let texture = device.create_texture(&wgpu::TextureDescriptor {

@@ -1,9 +1,9 @@
 //! Paints the window on the CPU if the graphics adapter is a CPU adapter.
 //!
 //! egui's meshes take several times as long in a software Vulkan driver as in [`Painter`]. The meshes of the window are
-//! therefore painted here, and the adapter copies one picture.
+//! therefore painted here, and the adapter copies one image.
 
-mod adapter_picture;
+mod adapter_image;
 mod unsent_parts;
 
 use std::sync::Arc;
@@ -15,10 +15,10 @@ use parking_lot::Mutex;
 
 use crate::gui::rendering::chunks::Tessellation;
 use crate::gui::rendering::painter::Painter;
-use adapter_picture::CopyCallback;
+use adapter_image::CopyCallback;
 use unsent_parts::UnsentParts;
 
-/// Replaces the meshes of a frame by the copy of a picture.
+/// Replaces the meshes of a frame by the copy of an image.
 pub(super) struct SoftwareWindow {
     tessellation: Tessellation,
     painter: Painter,
@@ -73,26 +73,26 @@ mod tests {
     use crate::gui::theme::ThemeName;
 
     fn sample_ui(ui: &mut egui::Ui) {
-        ui.label("one picture");
+        ui.label("one image");
         ui.add(egui::Slider::new(&mut 0.3, 0.0..=1.0));
         ui.button("unchanged").highlight();
     }
 
-    /// Writes the unsent parts into the picture on the adapter; returns the number of their pixels.
-    fn send(unsent: &Mutex<UnsentParts>, picture: &mut RgbaImage) -> usize {
+    /// Writes the unsent parts into the image on the adapter; returns the number of their pixels.
+    fn send(unsent: &Mutex<UnsentParts>, image: &mut RgbaImage) -> usize {
         let mut sent = 0;
         for (part, colors) in unsent.lock().take() {
             sent += colors.pixels.len();
             for (index, color) in colors.pixels.iter().enumerate() {
                 let [x, y] = [part.at[0] + index % part.size[0], part.at[1] + index / part.size[0]];
-                picture.put_pixel(x as u32, y as u32, image::Rgba(color.to_array()));
+                image.put_pixel(x as u32, y as u32, image::Rgba(color.to_array()));
             }
         }
         sent
     }
 
     #[test]
-    fn the_picture_on_the_adapter_has_the_same_pixels() {
+    fn the_image_on_the_adapter_has_the_same_pixels() {
         for scale in [1.0, 1.5] {
             let size_px = [360, 180];
             let options = HeadlessOptions { size_px, pixels_per_point: scale, theme: ThemeName::Light };
@@ -106,14 +106,14 @@ mod tests {
             let unsent = Arc::clone(&plugin.unsent);
             let (mut window, mut adapter) = (Headless::new(options), Painter::new());
             window.context().add_plugin(plugin);
-            let mut picture = RgbaImage::new(size_px[0], size_px[1]);
+            let mut image = RgbaImage::new(size_px[0], size_px[1]);
             let Ok(_) = window.screenshot(&mut adapter, panel);
-            assert_eq!(send(&unsent, &mut picture), 360 * 180, "no more than once, after several frames");
-            assert!(picture == expected, "at {scale}");
+            assert_eq!(send(&unsent, &mut image), 360 * 180, "no more than once, after several frames");
+            assert!(image == expected, "at {scale}");
 
             let again = window.frame(Vec::new(), panel);
             assert!(again.textures.is_empty(), "the adapter needs no texture of egui");
-            assert_eq!(send(&unsent, &mut picture), 0, "what did not change is not sent again");
+            assert_eq!(send(&unsent, &mut image), 0, "what did not change is not sent again");
 
             // Only changed rectangles are sent.
             let changed = |ui: &mut egui::Ui| {
@@ -124,9 +124,9 @@ mod tests {
             };
             let Ok(expected) = plain.screenshot(&mut painter, changed);
             let Ok(_) = window.screenshot(&mut adapter, changed);
-            let sent = send(&unsent, &mut picture);
+            let sent = send(&unsent, &mut image);
             assert!(sent > 0 && sent < 360 * 180, "{sent} pixels");
-            assert!(picture == expected, "changed at {scale}");
+            assert!(image == expected, "changed at {scale}");
         }
     }
 }

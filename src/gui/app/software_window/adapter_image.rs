@@ -1,4 +1,4 @@
-//! The picture of the window on the adapter, and its copy into egui's render pass.
+//! The image of the window on the adapter, and its copy into egui's render pass.
 //!
 //! egui's own shader computes filters and dithering of every pixel, also where they are switched off: a software driver
 //! evaluates both sides of a condition.
@@ -11,9 +11,9 @@ use parking_lot::Mutex;
 
 use super::unsent_parts::UnsentParts;
 use crate::gui::rendering::painter::PixelRect;
-use crate::gui::rendering::picture_copy::PictureCopy;
+use crate::gui::rendering::image_copy::ImageCopy;
 
-/// Sends the changed parts to the adapter and shows the picture.
+/// Sends the changed parts to the adapter and shows the image.
 pub(super) struct CopyCallback {
     pub(super) unsent: Arc<Mutex<UnsentParts>>,
     pub(super) target_format: wgpu::TextureFormat,
@@ -30,30 +30,30 @@ impl CallbackTrait for CopyCallback {
     ) -> Vec<wgpu::CommandBuffer> {
         let mut unsent = self.unsent.lock();
         let size_px = unsent.size_px();
-        let picture =
-            resources.entry::<AdapterPicture>().or_insert_with(|| AdapterPicture::new(device, self.target_format));
-        picture.resize(device, size_px);
+        let image =
+            resources.entry::<AdapterImage>().or_insert_with(|| AdapterImage::new(device, self.target_format));
+        image.resize(device, size_px);
         for (part, colors) in unsent.take() {
-            picture.write(queue, part, &colors);
+            image.write(queue, part, &colors);
         }
         Vec::new()
     }
 
     fn paint(&self, _info: PaintCallbackInfo, pass: &mut wgpu::RenderPass<'static>, resources: &CallbackResources) {
-        if let Some(AdapterPicture { copy, texture: Some((_, group)) }) = resources.get::<AdapterPicture>() {
+        if let Some(AdapterImage { copy, texture: Some((_, group)) }) = resources.get::<AdapterImage>() {
             copy.draw(pass, group);
         }
     }
 }
 
-struct AdapterPicture {
-    copy: PictureCopy,
+struct AdapterImage {
+    copy: ImageCopy,
     texture: Option<(wgpu::Texture, wgpu::BindGroup)>,
 }
 
-impl AdapterPicture {
+impl AdapterImage {
     fn new(device: &wgpu::Device, target_format: wgpu::TextureFormat) -> Self {
-        Self { copy: PictureCopy::new(device, target_format), texture: None }
+        Self { copy: ImageCopy::new(device, target_format), texture: None }
     }
 
     /// Creates the texture when its size has changed; the next parts fill it.

@@ -1,13 +1,13 @@
-//! Copies a finished picture into egui's render pass on a graphics adapter, pixel by pixel.
+//! Copies a finished image into egui's render pass on a graphics adapter, pixel by pixel.
 
 /// Pipeline of the copy, for one format of the pass's target.
-pub(in crate::gui) struct PictureCopy {
+pub(in crate::gui) struct ImageCopy {
     pipeline: wgpu::RenderPipeline,
     layout: wgpu::BindGroupLayout,
     sampler: wgpu::Sampler,
 }
 
-impl PictureCopy {
+impl ImageCopy {
     pub(in crate::gui) fn new(device: &wgpu::Device, target_format: wgpu::TextureFormat) -> Self {
         let shader = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some("copy"),
@@ -69,27 +69,27 @@ impl PictureCopy {
         Self { pipeline, layout, sampler }
     }
 
-    /// Layout of [`Self::group`], also for other pipelines that show pictures.
+    /// Layout of [`Self::group`], also for other pipelines that show images.
     pub(in crate::gui) fn layout(&self) -> &wgpu::BindGroupLayout {
         &self.layout
     }
 
-    /// Bind group of a picture, without interpolation between its pixels.
-    pub(in crate::gui) fn group(&self, device: &wgpu::Device, picture: &wgpu::TextureView) -> wgpu::BindGroup {
+    /// Bind group of an image, without interpolation between its pixels.
+    pub(in crate::gui) fn group(&self, device: &wgpu::Device, image: &wgpu::TextureView) -> wgpu::BindGroup {
         device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("copy"),
             layout: &self.layout,
             entries: &[
-                wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(picture) },
+                wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(image) },
                 wgpu::BindGroupEntry { binding: 1, resource: wgpu::BindingResource::Sampler(&self.sampler) },
             ],
         })
     }
 
-    /// Fills the viewport of the pass with a picture of the same size.
-    pub(in crate::gui) fn draw(&self, pass: &mut wgpu::RenderPass<'static>, picture: &wgpu::BindGroup) {
+    /// Fills the viewport of the pass with an image of the same size.
+    pub(in crate::gui) fn draw(&self, pass: &mut wgpu::RenderPass<'static>, image: &wgpu::BindGroup) {
         pass.set_pipeline(&self.pipeline);
-        pass.set_bind_group(0, picture, &[]);
+        pass.set_bind_group(0, image, &[]);
         pass.draw(0..3, 0..1);
     }
 }
