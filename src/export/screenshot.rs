@@ -422,7 +422,7 @@ mod tests {
     fn files_are_written_into_new_folders() {
         let folder = tempfile::tempdir().unwrap();
         let screenshot = RgbaImage::from_pixel(20, 30, image::Rgba([1, 2, 3, 255]));
-        let path = folder.path().join("a/b/picture.png");
+        let path = folder.path().join("a/b/screenshot.png");
         write_png(&screenshot, &path).unwrap();
         assert_eq!(fs::read(&path).unwrap(), png_bytes(&screenshot).unwrap());
         let error = write_png(&screenshot, &path.join("below-a-file.png")).unwrap_err().to_string();

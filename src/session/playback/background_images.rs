@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn a_window_sees_the_pictures_of_a_video_in_any_order() {
+    fn a_window_sees_the_images_of_a_video_in_any_order() {
         let folder = tempfile::TempDir::new().unwrap();
         let (log, rig, expected) = sample_video(folder.path());
         let images = BackgroundImages::start(ImageReader::new(log, &rig)).unwrap();
