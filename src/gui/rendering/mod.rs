@@ -3,6 +3,7 @@
 
 pub mod chunks;
 pub mod headless;
+pub(in crate::gui) mod image_copy;
 mod mixing;
 pub mod offscreen;
 pub mod painter;

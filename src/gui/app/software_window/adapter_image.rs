@@ -10,8 +10,8 @@ use egui::{ColorImage, PaintCallbackInfo};
 use parking_lot::Mutex;
 
 use super::unsent_parts::UnsentParts;
-use crate::gui::rendering::painter::PixelRect;
 use crate::gui::rendering::image_copy::ImageCopy;
+use crate::gui::rendering::painter::PixelRect;
 
 /// Sends the changed parts to the adapter and shows the image.
 pub(super) struct CopyCallback {
@@ -30,8 +30,7 @@ impl CallbackTrait for CopyCallback {
     ) -> Vec<wgpu::CommandBuffer> {
         let mut unsent = self.unsent.lock();
         let size_px = unsent.size_px();
-        let image =
-            resources.entry::<AdapterImage>().or_insert_with(|| AdapterImage::new(device, self.target_format));
+        let image = resources.entry::<AdapterImage>().or_insert_with(|| AdapterImage::new(device, self.target_format));
         image.resize(device, size_px);
         for (part, colors) in unsent.take() {
             image.write(queue, part, &colors);
