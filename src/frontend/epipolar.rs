@@ -24,6 +24,7 @@ pub struct BearingPair {
 
 impl BearingPair {
     /// Pair with `R f` in place of `f`.
+    #[inline]
     pub(super) fn rotated(&self, rotation: &UnitQuaternion<f64>) -> Self {
         Self { previous: rotation * self.previous, now: self.now }
     }
@@ -52,6 +53,7 @@ pub(super) struct EpipolarConstraint {
 }
 
 impl EpipolarConstraint {
+    #[inline]
     pub(super) fn new(pair: &BearingPair, direction: &Vector3<f64>) -> Self {
         let BearingPair { previous: rotated, now } = *pair;
         let (n, n_other) = (direction.cross(&rotated), now.cross(direction));
@@ -61,16 +63,19 @@ impl EpipolarConstraint {
     }
 
     /// True if the pair constrains the motion: its bearings are not parallel to the direction.
+    #[inline]
     pub(super) fn is_regular(&self) -> bool {
         self.variance >= MIN_VARIANCE
     }
 
     /// Derivative of `e` by a rotation vector of `R f` in the current camera frame, `R f × n'` (3 × 1).
+    #[inline]
     pub(super) fn by_rotation(&self) -> Vector3<f64> {
         self.rotated.cross(&self.other_normal)
     }
 
     /// Derivative of `e` by `t`, `R f × f'` (3 × 1).
+    #[inline]
     pub(super) fn by_direction(&self) -> Vector3<f64> {
         self.rotated.cross(&self.now)
     }
@@ -83,12 +88,14 @@ const MIN_VARIANCE: f64 = 1e-12;
 ///
 /// A point in front of both cameras moves towards `direction`; for a point that moves the other way the distance is the
 /// length of its motion.
+#[inline]
 pub(super) fn epipolar_distance(pair: &BearingPair, rotation: &UnitQuaternion<f64>, direction: &Vector3<f64>) -> f64 {
     epipolar_distances(&pair.rotated(rotation), direction)[0]
 }
 
 /// [`epipolar_distance`] of a pair whose previous bearing is already rotated, for a direction and its opposite, in
 /// radians.
+#[inline]
 pub(super) fn epipolar_distances(pair: &BearingPair, direction: &Vector3<f64>) -> [f64; 2] {
     let EpipolarConstraint { rotated, now, normal, residual, variance, .. } = EpipolarConstraint::new(pair, direction);
     let sampson = if variance > MIN_VARIANCE { residual.abs() / variance.sqrt() } else { 0.0 };
@@ -97,11 +104,13 @@ pub(super) fn epipolar_distances(pair: &BearingPair, direction: &Vector3<f64>) -
 }
 
 /// Geman–McClure weight `1/(1 + s)²` of a squared residual `s` in units of the loss's scale.
+#[inline]
 pub(super) fn geman_mcclure(s: f64) -> f64 {
     1.0 / ((1.0 + s) * (1.0 + s))
 }
 
 /// Adds `w·row·rowᵀ` to the lower triangle of a normal matrix.
+#[inline]
 pub(super) fn add_outer_product(normal: &mut SMatrix<f64, 5, 5>, row: &SVector<f64, 5>, weight: f64) {
     for column in 0..5 {
         for below in column..5 {

@@ -207,7 +207,8 @@ fn differentiate(patch: &Patch, rows: Range<usize>, mask: &[f32; LANES], gradien
             let rows = [&patch[row], &patch[row + 1], &patch[row + 2]];
             for lane in 0..REGISTER {
                 let c = first + lane;
-                let [x, y] = scharr(rows, c).map(|slope| slope * mask[c] * (1.0 / 32.0));
+                let [x, y] = scharr(rows, c);
+                let (x, y) = (x * mask[c] * (1.0 / 32.0), y * mask[c] * (1.0 / 32.0));
                 let value = rows[1][c + 1] * mask[c];
                 sums[0][lane] += value;
                 sums[1][lane] += value * value;
