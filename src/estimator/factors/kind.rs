@@ -4,7 +4,6 @@ use crate::text::Named;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum FactorKind {
-    /// Reprojections of features.
     Visual,
     /// Preintegrated IMU samples between two frames.
     Imu,
@@ -34,7 +33,6 @@ impl Named for FactorKind {
 }
 
 impl FactorKind {
-    /// Label for display.
     pub const fn label(self) -> &'static str {
         match self {
             Self::Visual => "visual",

@@ -1,6 +1,6 @@
 //! Zero-velocity update (ZUPT) of a stationary vehicle.
 //!
-//! It is soft: position equal to that of the previous frame and zero velocity, up to the motion that the images
+//! It is soft: position equal to the position of the previous frame and zero velocity, up to the motion that the images
 //! cannot resolve at the distance of the scene.
 
 use nalgebra::Vector3;

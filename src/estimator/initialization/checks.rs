@@ -3,12 +3,12 @@
 /// One check with its measured value and threshold.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WaitReason {
-    /// Short constant name.
+    /// Constant name for files and tests.
     pub test: &'static str,
     /// Reason for waiting (or result, when passed), with units.
     pub message: String,
     pub value: f64,
-    /// Threshold for `value`.
+    /// Limit that `value` is compared with.
     pub threshold: f64,
 }
 

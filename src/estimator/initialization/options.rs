@@ -13,7 +13,6 @@ const BLIND_EXTRINSICS_NOISE_RAD: f64 = 0.5;
 /// Common rotation error of the extrinsics, without an encoder.
 const BLIND_EXTRINSICS_SIGMA_RAD: f64 = 1.0;
 
-/// Options of [`crate::estimator::initialization::try_initialize`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct InitializationOptions {
     /// Standard deviation of a bearing: pixel noise over focal length.

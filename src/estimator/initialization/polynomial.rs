@@ -4,7 +4,7 @@
 /// level.
 const STEPS_PER_BRACKET: usize = 120;
 
-/// `Σ coefficients[i]·xⁱ`.
+/// Value `Σ coefficients[i]·xⁱ` by Horner's rule.
 pub(super) fn evaluate(coefficients: &[f64], x: f64) -> f64 {
     coefficients.iter().rev().fold(0.0, |sum, coefficient| sum * x + coefficient)
 }

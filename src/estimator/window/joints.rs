@@ -18,8 +18,8 @@ const MIN_LANDMARKS: usize = 15;
 /// readings are propagated with it: the visual rotation between the frames is then independent of the encoder.
 const SHARPER: f64 = 3.0;
 
-/// Standard deviation of joint angles that the difference of two gyroscopes predicts from those of the last frame, in
-/// radians: turn-on biases of 1°/s over two images.
+/// Standard deviation of joint angles that the difference of two gyroscopes predicts from the joint angles of the last
+/// frame, in radians: turn-on biases of 1°/s over two images.
 const GYROSCOPES_SIGMA_RAD: f64 = 0.002;
 
 impl WindowState {
@@ -105,8 +105,8 @@ impl WindowState {
         (count >= MIN_LANDMARKS).then(|| inverse.diagonal())
     }
 
-    /// Combines the encoder readings of a removed frame with those of the next frame, propagated by the
-    /// visually measured rotation of the joints between the frames.
+    /// Combines the encoder readings of a removed frame with the readings of the next frame, propagated by the visually
+    /// measured rotation of the joints between the frames.
     ///
     /// Only independent errors are averaged; the variance of the visual rotation is added.
     pub(crate) fn carry_encoder(&mut self, setup: &Setup, from: usize, to: usize) {
