@@ -43,7 +43,7 @@ const PIXELS_PER_BYTE: u64 = 1032 * 8;
 /// Memory that is assumed if the system does not report it.
 const UNKNOWN_MEMORY_BYTES: u64 = 8 << 30;
 
-/// Size of all message definitions of a log together; those of one type take some kilobytes.
+/// Size of all message definitions of a log together; definitions of one type take some kilobytes.
 pub(crate) const DEFINITION_BYTES: usize = 64 << 20;
 /// Size of text files that describe a source, such as a bag's `metadata.yaml`.
 pub(crate) const DESCRIPTION_BYTES: u64 = 16 << 20;

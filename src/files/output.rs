@@ -82,7 +82,7 @@ impl StagedFile {
         Ok(Self { temporary, target })
     }
 
-    /// Final path.
+    /// Path of the complete file.
     pub fn path(&self) -> &Path {
         &self.target
     }

@@ -10,7 +10,7 @@ pub(crate) fn number(value: f64) -> String {
     format!("{mantissa}{point}e{sign}{exponent}")
 }
 
-/// List in brackets.
+/// Numbers as a YAML list in brackets.
 pub(crate) fn numbers(values: &[f64]) -> String {
     format!("[{}]", values.iter().map(|value| number(*value)).collect::<Vec<_>>().join(", "))
 }

@@ -19,7 +19,7 @@ pub enum WarningKind {
     Dropped(&'static str),
     /// Intervals without IMU samples.
     ImuGap,
-    /// Intervals without images.
+    /// Time intervals without images.
     ImageGap,
     /// Copies of the image before.
     ImageCopy,

@@ -33,7 +33,7 @@ pub fn read_stills_chain(path: &Path, stills: &Stills) -> Result<StillsChain, Fi
     chain.map_err(|problem| FileError::Stills { problem, path: path.to_owned() })
 }
 
-/// Chain of a rig, whose frame of the IMU is that of the first rigid camera; cameras are found by key or `frame_id`.
+/// Chain of a rig, with the frame of the first rigid camera as IMU frame; cameras are found by key or `frame_id`.
 fn chain_of_rig(rig: &Rig, joints: &[String], rigid: &[&str]) -> Result<StillsChain, String> {
     let gimbal = rig.gimbal.as_ref().ok_or("the rig has no gimbal; expected that of the stills")?;
     let names: Vec<&str> = gimbal.joints.iter().map(|joint| joint.name.as_str()).collect();

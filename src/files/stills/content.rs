@@ -9,7 +9,7 @@ use super::document::{CameraDocument, SetDocument, StillsDocument, ViewDocument}
 use crate::camera::CameraModel;
 use crate::sensors::{MapPoint, StillCamera, StillSet, StillView, Stills};
 
-/// Value of `format`.
+/// Value of the field `format`.
 const FORMAT: &str = "acdcc-stills 1";
 /// Largest number of joints, as in a rig.
 const MAX_JOINTS: usize = 16;

@@ -26,7 +26,7 @@ impl LinkPath<'_> {
     /// the joint stays as near as possible to the described one.
     ///
     /// # Errors
-    /// When the joints are others than those of the chain, or a link at an end of the chain has no fixed joint.
+    /// If the joints differ from the joints of the chain, or a link at an end of the chain has no fixed joint.
     pub fn with_calibration(
         &self,
         joints: &[String],

@@ -1,4 +1,4 @@
-//! Images that equal the one before, and those of them that are certainly copies.
+//! Images that equal the image before, and the certain copies among them.
 
 /// Number of images over which copies that come regularly are found.
 const REMEMBERED: u32 = 8;

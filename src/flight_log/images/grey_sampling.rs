@@ -12,7 +12,7 @@ use crate::flight_log::messages::MessageKind;
 const STRETCH_NS: i64 = 2_000_000_000;
 /// Largest number of stretches, which bounds the time for a long recording.
 const MAX_STRETCHES: usize = 32;
-/// Number of images of a stretch: the median of their ranges is not that of one with a closed shutter.
+/// Number of images of a stretch: one image with a closed shutter does not change the median of their ranges.
 const IMAGES_PER_STRETCH: usize = 3;
 
 /// Conversion of a topic's images from 16 bits to 8. It is computed once per log, from at most 96 images.

@@ -176,7 +176,7 @@ impl Mosaic<'_> {
             let [above, below] = mirrored(row, self.height);
             let (above, this, below) = (line(above), line(row), line(below));
             let in_red_row = row % 2 == self.red[1];
-            // Color of this row that is not green, and that of the rows above and below.
+            // Color of this row that is not green, and the color of the rows above and below that is not green.
             let (in_row, other) = if in_red_row { (red, blue) } else { (blue, red) };
             for column in 0..self.width {
                 let [left, right] = mirrored(column, self.width);

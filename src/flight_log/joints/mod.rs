@@ -18,7 +18,7 @@ pub(crate) struct JointReading {
     pub(crate) angles_rad: Vec<Option<f64>>,
 }
 
-/// Merges readings by joint name at the stamps of the first joint; those of the others are interpolated.
+/// Merges readings by joint name at the stamps of the first joint; readings of the other joints are interpolated.
 ///
 /// Messages with all joints pass unchanged.
 #[derive(Clone, Debug)]

@@ -15,7 +15,6 @@ use self::protobuf::{ProtobufReader, ProtobufValue};
 use crate::geometry::RigidTransform;
 use crate::text::Named;
 
-/// Supported message type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum MessageKind {
     Imu,
@@ -109,7 +108,7 @@ impl MessageKind {
     }
 }
 
-/// `std_msgs/msg/Header`.
+/// Header of a message, `std_msgs/msg/Header`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Header<'a> {
     /// Nanoseconds since the epoch.
@@ -124,7 +123,7 @@ pub(in crate::flight_log) fn read_header<'a>(reader: &mut CdrReader<'a>) -> Resu
     Ok(Header { stamp_ns: seconds * 1_000_000_000 + nanoseconds, frame_id })
 }
 
-/// Microseconds as nanoseconds.
+/// Stamp in nanoseconds from one in microseconds.
 fn read_px4_stamp(reader: &mut CdrReader<'_>) -> Result<i64, CdrError> {
     let microseconds = i64::try_from(reader.read_u64()?).unwrap_or(i64::MAX);
     Ok(microseconds.saturating_mul(1000))
@@ -175,7 +174,7 @@ pub(crate) struct ImageMessage<'a> {
     pub(crate) height: usize,
     pub(crate) encoding: &'a str,
     pub(crate) big_endian: bool,
-    /// Bytes per row.
+    /// Number of bytes per row.
     pub(crate) step: usize,
     pub(crate) data: &'a [u8],
 }
@@ -208,7 +207,7 @@ pub(crate) struct VideoPacket<'a> {
     pub(crate) frame_id: &'a str,
     /// Name of the compression, supported or not.
     pub(crate) format: &'a str,
-    /// Annex B.
+    /// Encoded frame as an Annex B byte stream.
     pub(crate) data: &'a [u8],
 }
 
@@ -288,7 +287,7 @@ fn read_protobuf_timestamp(message: &[u8]) -> Result<i64, CdrError> {
 pub(crate) struct CameraInfoMessage {
     pub(crate) width: usize,
     pub(crate) height: usize,
-    /// `plumb_bob`, `equidistant`, ….
+    /// Name of the model: `plumb_bob`, `equidistant`, ….
     pub(crate) distortion_model: String,
     pub(crate) distortion: Vec<f64>,
     /// `K`, row by row.

@@ -92,7 +92,7 @@ pub(in super::super) fn clock_by_forces(
 #[derive(Clone, Copy, Debug)]
 struct ReferenceForce {
     time_s: f64,
-    /// Magnitude in m/s².
+    /// Magnitude of the specific force in m/s².
     magnitude: f64,
     /// Derivative of the magnitude by the position of the other IMU in the vehicle, `f̂ᵀ ([α]× + [ω]×²)`, in 1/s².
     by_arm: Vector3<f64>,
@@ -154,8 +154,8 @@ type Gradient = SVector<f64, UNKNOWNS>;
 /// Offset at the start of the video in seconds, drift, and standard deviation of the offset in the middle, by least
 /// squares of `measured(t) = level + scale · |f|(t') + ∂|f|/∂arm(t') · arm` with `t' = t + offset + drift · (t − middle)`.
 ///
-/// Differences of the two magnitudes, such as those by the motion of the camera in the gimbal, last longer than a sample:
-/// the standard deviation is that of sums over sections.
+/// Differences of the two magnitudes, for example by the motion of the camera in the gimbal, last longer than a sample:
+/// the standard deviation is computed from sums over sections.
 fn refined(reference: &[ReferenceForce], measured: &[(f64, f64)], offset_s: f64) -> Option<(f64, f64, f64)> {
     let middle_s = measured.iter().map(|(time_s, _)| time_s).sum::<f64>() / measured.len().max(1) as f64;
     let mut state = Gradient::zeros();
