@@ -33,7 +33,7 @@ pub(super) fn difference_text(quantity: ComparedQuantity, apart: f64) -> String 
 /// Tooltip of a trajectory of another program.
 pub(in crate::gui) const POSES_ONLY: &str = "A trajectory has poses only: scene, timeline and comparison show it, panels of calibration, features and residuals do not";
 
-/// Note below the heading of the accuracy if the reference trajectory is that of an offline calibration.
+/// Note below the heading of the accuracy if an offline calibration made the reference trajectory.
 pub(super) const AGAINST_BATCH: &str = "Against the batch reference, not ground truth";
 
 /// Accuracy of all runs and trajectories; the best value of a row is marked.

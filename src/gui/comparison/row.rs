@@ -49,7 +49,7 @@ pub(super) struct LineCurves {
 
 /// The values of one run in a row.
 pub(super) struct Line<'a> {
-    /// Index of the column for colour and dashes: of the run, or after the runs that of the trajectory.
+    /// Index of the column for colour and dashes: the index of the run or, counted after the runs, of the trajectory.
     pub(super) run: usize,
     pub(super) epoch: u64,
     pub(super) stamps_ns: &'a [i64],

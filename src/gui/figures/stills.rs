@@ -16,7 +16,7 @@ const HEAD: f32 = 74.0;
 const GAP: f32 = 22.0;
 /// Space below the last plot for the ids of the sets.
 const BELOW: f32 = 34.0;
-/// Ratio of the first plot's height to that of all plots.
+/// Ratio of the first plot's height to the height of all plots.
 const FIRST: f32 = 0.46;
 const MARKER: f32 = 3.5;
 /// Half height of a strip, in standard deviations of the encoder.

@@ -60,7 +60,7 @@ fn mesh_of(theme: &Theme, area: Rect, place: Rect, model: &JacobianModel) -> Mes
     mesh
 }
 
-/// Height of the column names in points; larger than that of a chain if the names of sensors are longer.
+/// Height of the column names in points; larger than the height for a chain if the names of sensors are longer.
 pub(super) fn column_names_height(ui: &Ui, model: &JacobianModel) -> f32 {
     /// Height with the columns of a chain, and height of the names of groups, in points.
     const OF_CHAIN: f32 = 68.0;

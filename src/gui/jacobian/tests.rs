@@ -85,7 +85,7 @@ fn axes_are_whole_and_in_order() {
 #[test]
 fn columns_are_in_groups_and_joints_have_rates() {
     let mut jacobian = model().jacobian;
-    // A time offset between the columns of the chain, as that of the main camera before a rigid one.
+    // A time offset between the columns of the chain, like the main camera's time offset before a rigid camera.
     let place = 4;
     for (column, name) in [(place, "readout"), (place + 1, "gyroscope.sx"), (place + 2, "fx")] {
         jacobian.columns[column].id = ColumnId::Calibration(parameter(name));

@@ -58,7 +58,7 @@ impl PlotArea {
     }
 }
 
-/// Time ranges of the rows for which `holds` is true: from the stamp of the first row to that of the row after the
+/// Time ranges of the rows for which `holds` is true: from the stamp of the first row to the stamp of the row after the
 /// last.
 fn segments_where(stamps_ns: &[i64], holds: impl Fn(usize) -> bool) -> Vec<(i64, i64)> {
     let mut segments = Vec::new();

@@ -16,7 +16,7 @@ const NARROW_VALUE_GUTTER: f32 = 40.0;
 const NARROW: f32 = 220.0;
 /// Height of the gutter of the times in points.
 pub(crate) const TIME_GUTTER: f32 = 14.0;
-/// Height of the gutter of a plot whose times are those of the plot below it, in points.
+/// Height of the gutter of a plot that shares the times of the plot below it, in points.
 pub(crate) const TICKS_ONLY: f32 = 4.0;
 
 /// Distance of two values on an axis in points, at least.
@@ -26,7 +26,7 @@ const TIME_PITCH: f32 = 40.0;
 /// Half the height of a label in points.
 const HALF_LABEL: f32 = 6.0;
 
-/// Rectangle of the curves in the rectangle of a plot with its gutters, that of the times being `below` points high.
+/// Rectangle of the curves in the rectangle of a plot with its gutters; the gutter of the times is `below` points high.
 pub(crate) fn within_gutters(outer: Rect, below: f32) -> Rect {
     let left = if outer.width() < NARROW { NARROW_VALUE_GUTTER } else { VALUE_GUTTER };
     let (left, below) = (left.min(0.5 * outer.width()), below.min(0.5 * outer.height()));

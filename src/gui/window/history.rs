@@ -82,7 +82,7 @@ impl SettingsHistory {
         self.barrier = Some(message);
     }
 
-    /// Replaces the markers of all changes by those of a session that is opened.
+    /// Replaces the markers of all changes by the markers of a session that is opened.
     pub(super) fn begin_session(&mut self, markers: &Markers) {
         let known = self.before.iter_mut().chain(&mut self.undone).chain(&mut self.current).chain(&mut self.pending);
         for arrangement in known {

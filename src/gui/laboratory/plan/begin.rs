@@ -12,7 +12,7 @@ use crate::simulation::{MotionSample, MotionSplines, PrescribedMotion};
 const EXACT: f64 = 5e-5;
 
 impl PlanView {
-    /// Makes the motion from which to start, or that of an opened file.
+    /// Makes the initial motion, or the motion of an opened file.
     pub(super) fn make_motion(&mut self, problem: &Arc<MotionProblem>) {
         let situation = problem.situation();
         if let Some(opened) = self.opened.take() {

@@ -1,4 +1,4 @@
-//! Duration, limits and scene of a planned motion; the defaults are those of `dcvins plan`.
+//! Duration, limits and scene of a planned motion, with the defaults of `dcvins plan`.
 
 use egui::{DragValue, Ui};
 

@@ -46,7 +46,7 @@ pub struct FigureSpec {
     /// Stamp of values that are not over time; `None` for the end of the range, without a line of the cursor.
     pub cursor_ns: Option<i64>,
     pub width_mm: f64,
-    /// Height; `None` for that of the content.
+    /// Height in millimetres; `None` for the height of the content.
     pub height_mm: Option<f64>,
     /// Size of the text of axes and labels in points of 1/72 inch.
     pub font_pt: f64,
