@@ -146,7 +146,8 @@ fn field_of_view_deg(model: &CameraModel) -> Option<f64> {
 fn check_camera_info(log: &FlightLog, camera: &CameraRig, findings: &mut Findings) {
     let Ok(published) = log.published_camera(&camera.topic, &camera.topic) else { return };
     let model = &camera.model;
-    // Intrinsics of the whole sensor are compared as such; that they are not those of the images is another finding.
+    // Intrinsics of the whole sensor are compared with the rig's; another finding reports their difference from the
+    // intrinsics of the images.
     let of_sensor = model.resolution_px == published.sensor.resolution_px;
     let from_log = if of_sensor { &published.sensor } else { &published.image };
     let (rig, log) = (model.intrinsics_px, from_log.intrinsics_px);
@@ -183,7 +184,7 @@ fn in_tenths(intrinsics_px: [f64; 4]) -> String {
 }
 
 /// Largest distance between the pixels of one direction in two cameras, in pixels, and the pixel in the first one.
-/// Directions are those of a grid over the first camera's image that are visible in both.
+/// Directions are taken on a grid over the first camera's image, where both cameras see them.
 fn largest_pixel_difference(camera: &CameraModel, other: &CameraModel) -> (f64, Vector2<f64>) {
     const CELLS: u32 = 8;
     let [width, height] = camera.resolution_px.map(|side| side as f64 - 1.0);

@@ -26,8 +26,8 @@ pub(super) fn slope(points: &[(f64, f64)]) -> (f64, f64) {
     (slope, (rest / (count - 2.0) / spread.max(f64::MIN_POSITIVE)).sqrt())
 }
 
-/// Standard deviation of the white part of the readings, from second differences, in their unit; those of angles in
-/// radians wrap after a turn. Their median is insensitive to jumps.
+/// Standard deviation of the white part of the readings, from second differences, in their unit; angles in radians
+/// repeat after 2π. The median of the differences is insensitive to jumps.
 pub(super) fn white_sigma(values: &[f64], wraps: bool) -> f64 {
     let difference = |from: f64, to: f64| if wraps { wrap_angle(to - from) } else { to - from };
     let second: Vec<f64> = values

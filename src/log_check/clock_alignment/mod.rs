@@ -29,7 +29,7 @@ use crate::geometry::{ns_from_seconds, seconds_from_ns, so3};
 const MIN_ROTATION_RAD: f64 = 0.001;
 /// Minimum ratio of the squared rotations that the reference explains.
 const MIN_EXPLAINED: f64 = 0.6;
-/// Minimum ratio of the unexplained rotations of the next offset to those of the best one.
+/// Minimum ratio of the unexplained rotations of the next offset to the unexplained rotations of the best one.
 const MIN_DISTINCTION: f64 = 1.5;
 /// Lengths over which rotations of consecutive images are composed, in seconds, for a noisy reference: from one image
 /// to the next a stabilized camera rotates too little.
@@ -76,7 +76,7 @@ pub enum AlignmentError {
         offset_s: f64,
         /// Ratio of the squared rotations that the best offset explains.
         explained: f64,
-        /// Second best offset.
+        /// Second best offset in seconds.
         next_s: f64,
         /// Ratio that the second best offset explains.
         next_explained: f64,
@@ -135,8 +135,8 @@ fn without_outliers(images: &[ImageRotation]) -> Vec<ImageRotation> {
     images.iter().zip(&distances).filter(|(_, distance)| **distance <= limit).map(|(image, _)| image.clone()).collect()
 }
 
-/// Rotations over at least `length_s`, composed from those of consecutive images; each one starts in the middle of the
-/// previous one.
+/// Rotations over at least `length_s`, composed of rotations of consecutive images; each one starts in the middle of
+/// the previous one.
 fn composed(images: &[ImageRotation], length_s: f64) -> Vec<PairRotation> {
     let half_ns = ns_from_seconds(0.25 * length_s);
     let mut found = Vec::new();

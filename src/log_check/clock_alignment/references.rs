@@ -31,8 +31,8 @@ impl fmt::Display for AlignmentReference {
     }
 }
 
-/// Finds the offset of a camera's clock from that of the log's IMU, by the gyroscope and, for a camera on a gimbal, by
-/// gyroscope and joint angles; returns the better of both.
+/// Finds the offset of a camera's clock from the clock of the log's IMU, by the gyroscope and, for a camera on a
+/// gimbal, by gyroscope and joint angles; returns the better of both.
 ///
 /// # Errors
 /// The error of the better reference, if no offset explains the rotations.

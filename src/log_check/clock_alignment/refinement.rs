@@ -268,7 +268,7 @@ pub struct ClockAlignment {
     pub next: Option<(f64, f64)>,
     /// Rotation from the reference's body frame to the camera frame, as a rotation vector in radians.
     pub camera_from_body_rad: [f64; 3],
-    /// Ratio of the rotations of the images to those of the reference; below 1 if the focal length is too long.
+    /// Ratio of the rotations of the images to the rotations of the reference; below 1 if the focal length is too long.
     pub scale: f64,
     /// Number of image rotations that overlap with the reference.
     pub rotations: usize,

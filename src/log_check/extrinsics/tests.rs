@@ -189,7 +189,7 @@ fn images_that_are_turned_or_mirrored_are_named() {
     let quarter = of(|_| Vector3::new(0.0, 0.0, FRAC_PI_2));
     expect(&quarter, Severity::Error, &[&words("rotated by 90°")]);
     expect(&of(|_| Vector3::new(0.0, 0.0, PI)), Severity::Error, &[&words("upside down (rotated by 180°)")]);
-    // Rotations in mirrored images are those of a camera that is turned by half a turn.
+    // Rotations in mirrored images equal the rotations of a camera that is rotated by 180°.
     let mirrored = of(|_| Vector3::new(PI, 0.0, 0.0));
     expect(&mirrored, Severity::Error, &[&words("mirrored (left and right exchanged)"), "look at text"]);
 }

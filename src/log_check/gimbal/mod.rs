@@ -255,7 +255,7 @@ fn check_attitude(survey: &Survey, findings: &mut Findings) {
     }
 }
 
-/// Compares the first and the last joint angles with those of the images.
+/// Compares the times of the first and the last joint angles with the times of the images.
 pub(crate) fn check_joint_coverage(survey: &Survey, rig: &Rig, findings: &mut Findings) {
     if rig.gimbal.as_ref().is_none_or(|gimbal| gimbal.topic.is_none()) {
         return;

@@ -16,7 +16,7 @@ const SMOOTHED_STEP_NS: i64 = 31_250_000;
 /// Upper bound of the mean angular rate, bias included.
 const MEAN_RATE_RAD_PER_S: f64 = 0.08;
 
-/// Window of [`WINDOW_NS`].
+/// Window of length [`WINDOW_NS`].
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Window {
     pub(crate) range_ns: (i64, i64),

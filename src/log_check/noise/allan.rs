@@ -1,7 +1,7 @@
 //! Overlapping Allan variance of evenly sampled stretches, with its equivalent degrees of freedom.
 //!
-//! Estimator and degrees of freedom are those of NIST Special Publication 1065 (W. J. Riley, 2008, §5.2.4 and §5.4.1;
-//! Howe, Allan and Barnes, 1981), applied to inertial sensors as in IEEE Std 952, annex C: the angle or velocity is the
+//! Estimator and degrees of freedom follow NIST Special Publication 1065 (W. J. Riley, 2008, §5.2.4 and §5.4.1; Howe,
+//! Allan and Barnes, 1981), applied to inertial sensors as in IEEE Std 952, annex C: the angle or velocity is the
 //! phase, the angular rate or specific force the frequency.
 
 use std::collections::BTreeSet;
@@ -87,8 +87,8 @@ pub(super) fn overlapping(stretches: &[AllanPhase], count: usize, period_s: f64)
     Some(AllanVariance { count, tau_s, variance: sum / (2.0 * tau_s * tau_s * terms as f64) })
 }
 
-/// Equivalent degrees of freedom of [`overlapping`]: those of independent stretches, weighted by their numbers of terms
-/// (Satterthwaite).
+/// Equivalent degrees of freedom of [`overlapping`]: the degrees of freedom of independent stretches, weighted by their
+/// numbers of terms (Satterthwaite).
 pub(super) fn degrees_of_freedom(stretches: &[AllanPhase], count: usize, kind: NoiseKind) -> f64 {
     let (mut all, mut spread) = (0.0, 0.0);
     for phase in stretches {

@@ -227,7 +227,7 @@ fn filtered_points(points: &[AllanVariance], used: &[usize], stretches: &[AllanP
 }
 
 /// Nonnegative least squares: the best of all subsets of the columns whose solution is not negative. The covariance is
-/// that of all columns.
+/// computed with all columns.
 fn nonnegative(design: &DMatrix<f64>, target: &DVector<f64>) -> Option<(DVector<f64>, DMatrix<f64>)> {
     let columns = design.ncols();
     // Columns are scaled to keep the normal equations well conditioned.

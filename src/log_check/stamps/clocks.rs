@@ -65,7 +65,7 @@ fn latency_s(used: &UsedTopic<'_>) -> f64 {
 }
 
 fn check_future(used: &UsedTopic<'_>, findings: &mut Findings) {
-    // Small time offsets are those of the exposure or of filters.
+    // Small time offsets are caused by the exposure or by filters.
     let of_clock = used.shift_s.abs() > CLOCK_TOLERANCE_S;
     let shift_s = if of_clock { latency_s(used) - used.topic.median_latency_s() } else { 0.0 };
     let role = &used.role;

@@ -61,7 +61,7 @@ pub(crate) fn used_topics<'a>(survey: &'a Survey, rig: Option<&Rig>) -> Vec<Used
         let shift = ("timeshift_cam_imu", camera.timeshift_cam_imu_s);
         add(&camera.key, Some(&camera.topic), Some(camera.rate_hz), Some(shift));
     }
-    // Transforms of other frames are interleaved with those of the gimbal.
+    // Transforms of other frames are interleaved with the gimbal's transforms.
     let of_one_kind = |gimbal: &&GimbalRig| {
         let message = gimbal.attitude.as_ref().map(|source| &source.message);
         !matches!(message, Some(AttitudeMessage::Transforms { .. }))

@@ -15,7 +15,7 @@ pub(crate) struct Times {
     pub(crate) stamp_ns: i64,
     /// Checksum of the content without the header, `None` if the message has none or cannot be read.
     pub(crate) checksum: Option<u32>,
-    /// Number of the header's frame among those of the topic.
+    /// Number of the header's frame among the frames of the topic.
     pub(crate) frame: usize,
 }
 
@@ -52,7 +52,7 @@ impl TopicSurvey {
         self.times.iter().filter(is_new).map(|times| times.stamp_ns).collect()
     }
 
-    /// Number of a frame among those of the topic; frames beyond the limit share one.
+    /// Number of a frame among the frames of the topic; frames beyond the limit share one.
     pub(crate) fn frame(&mut self, name: &str) -> usize {
         let known = self.frames.iter().position(|known| known == name);
         known.unwrap_or_else(|| {

@@ -20,7 +20,8 @@ const SCALE_SIGMA: f64 = 0.005;
 /// Prior standard deviation of the camera's orientation where a hypothesis takes it from the rig, in radians.
 const KEPT_ORIENTATION_RAD: f64 = 0.02;
 const ITERATIONS: usize = 8;
-/// Half the relative range in which a focal length is searched around that of the grid, and the length at which it ends.
+/// Half the relative range in which a focal length is searched around the grid's focal length, and the length at which
+/// it ends.
 const FOCAL_RANGE: f64 = 0.06;
 const FOCAL_PRECISION: f64 = 1e-3;
 /// Change of all parameters, in units of their steps, at which the iterations end.
@@ -83,8 +84,8 @@ impl Explanation for Fitted {
 }
 
 impl Fitted {
-    /// True if the correction removes a misfit, in all rotations or, if it begins at a time, in those before or after it: a
-    /// larger likelihood alone can be that of a few wrong rotations.
+    /// True if the correction removes a misfit, in all rotations or, if it begins at a time, in the rotations before or
+    /// after it: a few wrong rotations alone can raise the likelihood.
     pub(super) fn removes_misfit(&self, given: &RotationFit) -> bool {
         let split_s = self.fault.since_s.unwrap_or(f64::NEG_INFINITY);
         let is_removed = |is_after: bool| {
@@ -98,7 +99,7 @@ impl Fitted {
     }
 }
 
-/// Length over which rotations of consecutive images are joined, in seconds; that of one pair for a rigid camera.
+/// Length over which rotations of consecutive images are joined, in seconds; for a rigid camera the length of one pair.
 pub(super) fn length_s(chain: &ClassicalChain) -> f64 {
     if chain.links.is_empty() { 0.0 } else { JOINED_S }
 }
@@ -111,7 +112,7 @@ pub(super) struct Fitter<'a> {
     priors: FitPriors,
     /// Smallest error of the orientation that counts as one, in radians.
     orientation_tolerance_rad: f64,
-    /// Rotations as recorded.
+    /// Rotations of the images as recorded.
     pub(super) measured: Vec<MeasuredRotation>,
 }
 
@@ -127,7 +128,8 @@ impl<'a> Fitter<'a> {
         Self { data, chain, priors, orientation_tolerance_rad, measured }
     }
 
-    /// Criterion of a fit with a number of parameters: those of the orientation count if it is not the rig's.
+    /// Criterion of a fit with a number of parameters; the three parameters of the orientation count if it is not the
+    /// rig's.
     pub(super) fn criterion(&self, fit: &RotationFit, parameters: usize) -> f64 {
         let turned = if self.has_other_orientation(fit) { 3 } else { 0 };
         fit.deviance + (parameters + turned) as f64 * self.parameter_cost()

@@ -18,8 +18,8 @@ const MEASURED_STEPS: usize = 24;
 const STATES_PER_STEP: usize = 5;
 /// Squared noise level of the misfits.
 const NOISE_LEVEL_SQUARED: f64 = 2.25;
-/// Cost of a change of the focal length beyond that of its two parameters:
-/// measurements that are wrong for a few images must not pay for two changes.
+/// Cost of a change of the focal length in addition to the cost of its two parameters: measurements that are wrong for
+/// a few images must not pay for two changes.
 const CHANGE_COST: f64 = 40.0;
 /// Smallest relative change that counts.
 const MIN_CHANGE: f64 = 0.04;
