@@ -160,7 +160,7 @@ struct Window<'a> {
 /// A feature with its bearing and depth in the anchor's camera, and its observing frames.
 struct AnchoredFeature {
     anchor: usize,
-    /// `(x/z, y/z, 1)`.
+    /// Point `(x/z, y/z, 1)` on the ray.
     ray: Vector3<f64>,
     inverse_depth_per_m: f64,
     observers: Vec<usize>,

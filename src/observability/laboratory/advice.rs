@@ -40,7 +40,7 @@ pub struct Advice {
     /// The least observable direction among those that some motion constrains.
     #[serde(rename = "weakest")]
     pub least_observable: WeakDirection,
-    /// Best candidate first.
+    /// Candidates, the best one first.
     pub candidates: Vec<CandidateReport>,
     /// Duration of each candidate, in seconds.
     pub duration_s: f64,

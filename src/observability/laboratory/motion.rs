@@ -168,7 +168,7 @@ const ROOM_RATIO: f64 = 0.9;
 #[derive(Clone, Debug)]
 pub(super) struct MechanismState {
     pub(super) world_from_imu: RigidTransform,
-    /// In the world.
+    /// Velocity in the world frame.
     pub(super) velocity_m_per_s: Vector3<f64>,
     /// In the IMU frame.
     pub(super) angular_velocity_rad_per_s: Vector3<f64>,

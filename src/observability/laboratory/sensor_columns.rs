@@ -1,4 +1,4 @@
-//! Sets of sensor columns of an experiment, in addition to those of the chain.
+//! Sets of sensor columns of an experiment, in addition to the columns of the chain.
 
 use std::fmt;
 use std::str::FromStr;
@@ -29,7 +29,7 @@ pub struct UnknownColumns {
 
 impl SensorColumns {
     pub const NAMES: [&'static str; 4] = ["readout", "timeshift", "intrinsics", "imu-intrinsics"];
-    /// The chain alone.
+    /// No columns but the chain's.
     pub const NONE: Self = Self { readout: false, timeshift: false, intrinsics: false, imu_intrinsics: false };
     pub const ALL: Self = Self { readout: true, timeshift: true, intrinsics: true, imu_intrinsics: true };
 

@@ -205,7 +205,7 @@ fn regular(mut covariance: DMatrix<f64>) -> DMatrix<f64> {
     covariance
 }
 
-/// Marginal information of the first `count` columns; the others (those of further cameras) are marginalized.
+/// Marginal information of the first `count` columns; the columns of further cameras are marginalized.
 fn marginal(information: DMatrix<f64>, count: usize) -> Option<DMatrix<f64>> {
     if information.ncols() <= count {
         return Some(information);

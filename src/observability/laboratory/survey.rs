@@ -67,7 +67,7 @@ pub struct MinFramesRow {
     /// Knowledge of poses and joint angles.
     pub scenario: String,
     pub columns: usize,
-    /// Full structural rank.
+    /// Largest structural rank over numbers of frames.
     pub rank: usize,
     /// Smallest number of frames with full rank.
     pub frames: usize,

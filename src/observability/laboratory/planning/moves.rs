@@ -1,4 +1,4 @@
-//! Moves with words: those of the suggested excitation, and the same with a second joint.
+//! Moves with words: the moves of the suggested excitation, and the same with a second joint.
 
 use super::super::Situation;
 use super::super::advice::words;

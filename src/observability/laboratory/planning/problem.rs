@@ -27,7 +27,7 @@ const SEED: u64 = 1;
 /// Motion from which a plan is edited.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum MotionStart {
-    /// Everything stands still.
+    /// Motion without any movement.
     AtRest,
     /// Slow waves in every channel.
     #[default]

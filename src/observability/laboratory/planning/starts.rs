@@ -51,8 +51,8 @@ pub(super) fn as_described(problem: &SearchProblem<'_>, duration_s: f64, moves: 
     curves(problem, duration_s, moves, DESCRIBED_KNOT_S)
 }
 
-/// Splines with these knots, whose control values are those of the moves; every move fades out at its end as it grows at
-/// its start.
+/// Splines with these knots and the control values of the moves; every move fades out at its end as it grows at its
+/// start.
 fn curves(problem: &SearchProblem<'_>, duration_s: f64, moves: &[HandMove], knot_s: f64) -> MotionSplines {
     let mut motion = at_rest(problem.situation, duration_s, knot_s);
     let joints = motion.joint_count();

@@ -123,8 +123,8 @@ pub(super) fn rows_of_keyframes(
     Some(WindowRows { rows: measured_rows(&linearization, &kept)? })
 }
 
-/// Rows from the start of a window to a time in it, with the keyframes that the estimator makes. The noise of the readings
-/// at a keyframe is that of the whole window, so that more of a window never measures less.
+/// Rows from the start of a window to a time in it, with the keyframes that the estimator makes. The readings at a
+/// keyframe have the noise of the readings of the whole window, so that more of a window never measures less.
 pub(super) fn rows_of_interval(
     situation: &Situation,
     motion: &MotionSplines,

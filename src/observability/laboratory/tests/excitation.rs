@@ -16,7 +16,7 @@ use crate::simulation::{
 const START_S: f64 = 6.0;
 /// Flights are equal up to this time: a spline depends on the next three knots.
 const SHARED_S: f64 = START_S - 0.4;
-/// Duration of the motion, that of the candidates.
+/// Duration of the motion, equal to the duration of the candidates.
 const MOTION_S: f64 = super::super::ADVICE_DURATION_S;
 
 pub(super) fn flight(exercise: Exercise, seed: u64) -> SyntheticFlight {

@@ -12,7 +12,8 @@ fn moves(parameterization: Parameterization, encoder: bool) -> (RankReport, impl
     let flight = flight(Exercise::full(VehicleSwing::Hover, None), 7);
     let like = estimator(&flight.given_rig, parameterization, encoder);
     let mut config = like.config().clone();
-    // First estimates belong to an earlier chain, whose directions differ slightly from those of the present one.
+    // First estimates belong to an earlier chain, whose directions differ slightly from the directions of the present
+    // one.
     config.options.calibration_first_estimates = false;
     config.options.first_estimate_reach_rad = 0.0;
     let mut estimator = Estimator::new(config);
