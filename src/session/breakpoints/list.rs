@@ -32,7 +32,7 @@ pub struct Breakpoint {
     pub condition: Condition,
     /// True if the cursor stops at its hits.
     pub enabled: bool,
-    /// By [`RunRecord::id`].
+    /// Hits of each run by [`RunRecord::id`].
     tracks: BTreeMap<u64, RunHits>,
 }
 

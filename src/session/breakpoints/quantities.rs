@@ -163,7 +163,6 @@ impl FlagName {
     }
 }
 
-/// All Boolean properties.
 pub(super) const FLAGS: &[FlagName] = &[
     FlagName { name: "tracking", meaning: "estimator initialized and tracking", value: tracking },
     FlagName { name: "initializing", meaning: "estimator initializing", value: |step| !tracking(step) },

@@ -73,7 +73,7 @@ impl FlightPrior {
         self.cameras.iter().position(|known| known == key)
     }
 
-    /// Requires one camera of a run in the posterior; `places` are those of `cameras`.
+    /// Requires one camera of a run in the posterior; `places` has the place of each of `cameras`.
     pub(in crate::session) fn check_cameras(&self, cameras: &[&str], places: &[Option<usize>]) -> Result<(), String> {
         if places.iter().any(Option::is_some) {
             return Ok(());

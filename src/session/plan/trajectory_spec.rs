@@ -105,7 +105,7 @@ impl fmt::Display for TrajectorySpec {
     }
 }
 
-/// Makes the labels of trajectories different from each other and from those of runs by appending numbers.
+/// Makes the labels of trajectories different from each other and from the labels of runs by appending numbers.
 pub(in crate::session) fn distinct_trajectory_labels(specs: &mut [TrajectorySpec], runs: &[&str]) {
     for index in 0..specs.len() {
         let (earlier, later) = specs.split_at_mut(index);
