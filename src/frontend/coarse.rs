@@ -8,8 +8,8 @@
 //! ECCV 2008).
 //!
 //! With the grey levels `I` and `I'` of the previous and of the current image, the projection `π` and the bearing `f` of a
-//! pixel `x` the cost is `Σ ρ(r/s)`, `r = I'(π(R f)) − a I(x) − b`, with the loss `ρ(u) = u²/(1 + u²)` of Geman and
-//! McClure. The step is inverse compositional (Baker and Matthews, "Lucas–Kanade 20 years on", IJCV 2004): the derivative
+//! pixel `x` the cost is `Σ ρ(r/s)`, `r = I'(π(R f)) − a I(x) − b`, with the Geman–McClure loss
+//! `ρ(u) = u²/(1 + u²)`. The step is inverse compositional (Baker and Matthews, "Lucas–Kanade 20 years on", IJCV 2004): the derivative
 //! `∇I ∂π/∂f (−[f]×)` of the previous image by `φ` does not depend on `R`, and `R ← R Exp(−φ)`.
 
 use nalgebra::{Matrix2x3, Matrix3, Matrix5, RowVector2, UnitQuaternion, Vector2, Vector3, Vector5};

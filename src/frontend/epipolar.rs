@@ -122,8 +122,8 @@ pub(super) fn add_outer_product(normal: &mut SMatrix<f64, 5, 5>, row: &SVector<f
 /// Damping of directions that neither tracks nor prior constrain, in the unit of [`gauss_newton_step`]'s normal matrix.
 const MIN_INFORMATION: f64 = 1e-9;
 
-/// A Gauss–Newton step on the Sampson distances of `pairs` in units of `scale`, reweighted by the loss of Geman and
-/// McClure; `None` if the equations are singular.
+/// A Gauss–Newton step on the Sampson distances of `pairs` in units of `scale`, reweighted by the Geman–McClure
+/// loss; `None` if the equations are singular.
 ///
 /// The step is `[φ; δ]` (5 × 1): `R ← R Exp(φ)`, and two coordinates of `t` on its tangent plane.
 /// `prior` is the information of the prior rotation (3 × 3), `rotation_error` its error in the current camera

@@ -233,12 +233,11 @@ impl FrontEnd {
             Some((uv_px, Some(reference)))
         };
         let known = track.reference.clone().and_then(&mut matched);
-        let (uv_px, reference) = match known.or_else(|| renewed().and_then(matched)) {
-            Some(found) => found,
-            None => {
-                let (previous, now) = (&self.previous, &self.now);
-                (lucas_kanade::track_on_finest_level(previous, now, &from_px, &near_px, options, motion)?, None)
-            }
+        let (uv_px, reference) = if let Some(found) = known.or_else(|| renewed().and_then(matched)) {
+            found
+        } else {
+            let (previous, now) = (&self.previous, &self.now);
+            (lucas_kanade::track_on_finest_level(previous, now, &from_px, &near_px, options, motion)?, None)
         };
         if self.mask.as_ref().is_some_and(|mask| mask.covers(&uv_px)) {
             return None;

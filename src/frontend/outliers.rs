@@ -126,7 +126,7 @@ const ROTATION_ITERATIONS: usize = 12;
 
 /// Robust fit of a rotation to pairs without parallax, from an initial one that may have a large error.
 ///
-/// Gauss–Newton on `Σ ρ(|Rᵀ f' − f|)` with `R ← R Exp(φ)` and the loss `ρ` of Geman and McClure: the step solves
+/// Gauss–Newton on `Σ ρ(|Rᵀ f' − f|)` with `R ← R Exp(φ)` and the Geman–McClure loss `ρ`: the step solves
 /// `Σ w (I − f fᵀ) φ = Σ w f × Rᵀ f'`. The scale of the loss decreases with the median of the residuals, down to `floor`
 /// (radians).
 pub fn fit_rotation(pairs: &[BearingPair], start: &UnitQuaternion<f64>, floor: f64) -> UnitQuaternion<f64> {
@@ -218,7 +218,7 @@ impl Ransac<'_> {
         let outlier_ratio = |best: &MotionHypothesis| best.cost / pairs;
         let mut best: Option<MotionHypothesis> = None;
         for rotation in [predicted, fitted] {
-            let found = self.from_rotation(rotation, threshold);
+            let found = self.search_at_rotation(rotation, threshold);
             if let Some(found) = found
                 && best.is_none_or(|best| found.cost < best.cost)
             {
@@ -229,7 +229,7 @@ impl Ransac<'_> {
             }
         }
         if best.as_ref().is_none_or(|best| outlier_ratio(best) > MAX_OUTLIER_RATIO)
-            && let Some(found) = self.from_samples_of_five(fitted, threshold)
+            && let Some(found) = self.search_by_five_tracks(fitted, threshold)
             && best.is_none_or(|best| found.cost < best.cost)
         {
             best = Some(found);
@@ -238,7 +238,7 @@ impl Ransac<'_> {
     }
 
     /// Samples directions of translation at a rotation and refines the best motion, at decreasing scales.
-    fn from_rotation(&mut self, rotation: &UnitQuaternion<f64>, threshold: f64) -> Option<MotionHypothesis> {
+    fn search_at_rotation(&mut self, rotation: &UnitQuaternion<f64>, threshold: f64) -> Option<MotionHypothesis> {
         let mut best = MotionHypothesis { rotation: *rotation, direction: Vector3::zeros(), cost: f64::INFINITY };
         for thresholds in SCALES {
             let scale = thresholds * threshold;
@@ -282,7 +282,7 @@ impl Ransac<'_> {
     }
 
     /// Best motion of random samples of five tracks; used if no start converged.
-    fn from_samples_of_five(&mut self, rotation: &UnitQuaternion<f64>, threshold: f64) -> Option<MotionHypothesis> {
+    fn search_by_five_tracks(&mut self, rotation: &UnitQuaternion<f64>, threshold: f64) -> Option<MotionHypothesis> {
         let mut best: Option<MotionHypothesis> = None;
         for _ in 0..FIVE_TRACK_SAMPLES {
             let sample: [BearingPair; 5] = std::array::from_fn(|_| self.pairs[self.random.below(self.pairs.len())]);
