@@ -74,10 +74,10 @@ impl PriorArguments {
 /// Links of a robot description that bound the chain, with the axes of the camera's link.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct RobotLinkArguments {
-    /// Link of the robot description whose frame is that of the IMU.
+    /// Link of the robot description that has the frame of the IMU.
     #[arg(long, value_name = "LINK", requires = "urdf")]
     pub imu_link: Option<String>,
-    /// Link of the robot description whose frame is that of the camera.
+    /// Link of the robot description that has the frame of the camera.
     #[arg(long, value_name = "LINK", requires = "urdf")]
     pub camera_link: Option<String>,
     /// Axes of that link: optical (x right, y down, z forward) or flu (x forward, y left, z up) [default: optical if its name

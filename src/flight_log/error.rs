@@ -44,7 +44,7 @@ pub enum LogError {
     },
     #[error("line {line} {problem}; expected 't x y z qx qy qz qw': {}", path.display())]
     TrajectoryLine {
-        /// Counted from 1.
+        /// Line number, counted from 1.
         line: usize,
         problem: String,
         path: PathBuf,
@@ -103,7 +103,7 @@ pub enum LogError {
         path.display()
     )]
     NoTransform { topic: String, problem: String, path: PathBuf },
-    /// The clock of a topic has no known relation to that of the log.
+    /// The clock of a topic has no known relation to the clock of the log.
     #[error(
         "'{topic}': the first stamp is {stamp} since an unknown start (PX4 counts from its start), the \
          first log time is {log_s:.3} s after the first stamp of the log; neither lies within the log, so the two \

@@ -64,9 +64,9 @@ impl fmt::Debug for ImageMask {
 /// 8-bit gray image, rows top to bottom without padding.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct GrayImage {
-    /// In pixels.
+    /// Number of columns in pixels.
     pub width: usize,
-    /// In pixels.
+    /// Number of rows in pixels.
     pub height: usize,
     /// `width · height` gray values.
     pub pixels: Vec<u8>,

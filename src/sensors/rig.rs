@@ -332,7 +332,7 @@ impl Rig {
     }
 
     /// Returns the rig with its gimbal fixed at encoder angles in radians, one per joint: its cameras are static and
-    /// there is no gimbal. `None` if the number of angles is not that of the joints.
+    /// there is no gimbal. `None` if the number of angles differs from the number of joints.
     pub fn at_joint_angles(&self, angles_rad: &[f64]) -> Option<Self> {
         let mut rig = self.clone();
         let Some(gimbal) = rig.gimbal.take() else { return angles_rad.is_empty().then_some(rig) };

@@ -103,7 +103,7 @@ pub struct EstimatorOptions {
     pub max_blind_s: f64,
     /// Number of observed landmarks below which the window counts as without visual measurements.
     pub min_landmarks: usize,
-    /// Fill [`crate::estimator::StepReport::linearization`].
+    /// Store the linearization of every step in [`crate::estimator::StepReport::linearization`].
     pub keep_linearization: bool,
     /// Keep the rows of factors without a feature in every report: [`crate::estimator::StepReport::factor_rows`].
     pub keep_factor_rows: bool,

@@ -48,7 +48,7 @@ impl DenseEquations {
         part += jacobian.tr_mul(&DVectorView::from_slice(rows.residual, height));
     }
 
-    /// Adds given products.
+    /// Adds `JᵀJ` and `Jᵀr` that the caller has already formed.
     fn add_products(&mut self, rows: &WhitenedRows<'_>, products: Products<'_>) {
         let columns = &mut self.scratch.columns;
         columns.clear();

@@ -70,9 +70,9 @@ pub(crate) struct JacobianBlock<'a> {
 /// Normal equations of a factor by the columns of its blocks.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Products<'a> {
-    /// `JᵀJ`.
+    /// Product `JᵀJ` over the columns of the blocks.
     pub(crate) hessian: &'a DMatrix<f64>,
-    /// `Jᵀr`.
+    /// Product `Jᵀr` over the columns of the blocks.
     pub(crate) gradient: &'a DVector<f64>,
 }
 

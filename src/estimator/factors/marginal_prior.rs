@@ -136,7 +136,7 @@ impl Prior {
         &self.columns
     }
 
-    /// `J`.
+    /// Square-root information matrix `J` of the prior.
     pub(crate) fn jacobian(&self) -> &DMatrix<f64> {
         &self.jacobian
     }

@@ -117,6 +117,6 @@ impl ProjectedRows {
 pub(crate) enum NewestRows {
     /// Only included in [`ProjectedRows::rows`].
     Among,
-    /// Also stored separately.
+    /// Rows that are also stored separately.
     Apart,
 }

@@ -36,7 +36,8 @@ pub(crate) struct VisualModel<'a> {
 }
 
 impl<'a> VisualModel<'a> {
-    /// Model with the ratio of its noise to that of the options, and with the robust losses of observations and of tracks.
+    /// Model with the ratio of its noise to the noise of the options, and with the robust losses of observations and of
+    /// tracks.
     pub(crate) fn new(
         camera: &'a CameraModel,
         options: &EstimatorOptions,
@@ -49,9 +50,9 @@ impl<'a> VisualModel<'a> {
 
     /// Robust cost of a track and the weight of all its observations, from the sum of their robust costs.
     ///
-    /// The loss is that of the mean over the degrees of freedom: a feature that is no point of the scene,
-    /// such as a corner where an outline crosses the background, slides with the viewpoint. Each of its residuals is
-    /// moderate, but they do not average out, so the track loses weight as a whole.
+    /// The loss applies to the mean over the degrees of freedom: a feature that is no point of the scene, such as a
+    /// corner where an outline crosses the background, slides with the viewpoint. Each of its residuals is moderate,
+    /// but they do not average out, so the track loses weight as a whole.
     fn track_cost_and_weight(&self, sum: f64, observations: usize) -> (f64, f64) {
         let freedom = (observations as f64 - OBSERVATIONS_PER_LANDMARK).max(0.5);
         let (cost, weight) = self.track_loss.cost_and_weight(sum / freedom);
@@ -195,7 +196,7 @@ impl<'a> Anchor<'a> {
 /// Robust weight of an observation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum RobustWeight {
-    /// Weight of the track as a whole, to be multiplied by that of the observation's residual.
+    /// Weight of the track as a whole, to be multiplied by the weight of the observation's residual.
     OfTrack(f64),
     /// Product of both, from a report.
     Known(f64),

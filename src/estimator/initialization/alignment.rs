@@ -55,7 +55,7 @@ pub(super) struct Alignment {
     pub(super) scale: f64,
     /// Gravity (pointing down) with exact magnitude, in m/s².
     pub(super) gravity: Vector3<f64>,
-    /// `start_from_imu` per view.
+    /// Pose `start_from_imu` of each view.
     pub(super) poses: Vec<RigidTransform>,
     /// Velocity per view, in m/s.
     pub(super) velocities: Vec<Vector3<f64>>,

@@ -55,7 +55,8 @@ pub(super) struct RefinedState {
 /// Standard deviations from the inverse of the last normal matrix.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct RefinementSigmas {
-    /// Relative standard deviation of the longest distance from the first view, which is that of the metric scale.
+    /// Relative standard deviation of the longest distance from the first view, which equals the relative standard
+    /// deviation of the metric scale.
     pub(super) scale: f64,
     pub(super) velocity_m_per_s: f64,
     pub(super) gravity_rad: f64,
@@ -85,7 +86,7 @@ impl RefinementLayout {
         Self::GLOBALS + view * self.per_view()
     }
 
-    /// First of the 6 pose columns of a view; those of the first view are fixed.
+    /// First of the 6 pose columns of a view; the pose of the first view is fixed.
     pub(super) fn pose(&self, view: usize) -> usize {
         self.velocity(view) + 3
     }
@@ -152,7 +153,7 @@ impl RefinedState {
             .collect()
     }
 
-    /// `start_from_camera` per view.
+    /// Pose `start_from_camera` of each view.
     pub(super) fn cameras(&self, given: &[RigidTransform]) -> Vec<RigidTransform> {
         self.poses.iter().zip(self.imu_from_camera(given)).map(|(pose, mount)| *pose * mount).collect()
     }

@@ -24,7 +24,7 @@ const EXTRA_SAMPLES: usize = 12;
 const KEPT: usize = 5;
 /// Two hypotheses within this rotation and [`SAME_HEADING_RAD`] are equal.
 const SAME_ROTATION_RAD: f64 = 0.02;
-/// See [`SAME_ROTATION_RAD`].
+/// Largest angle between equal translation directions, see [`SAME_ROTATION_RAD`].
 const SAME_HEADING_RAD: f64 = 0.2;
 /// A pose is also returned when its cost (χ²) exceeds the best one by less than this per pair.
 const AMBIGUOUS_RATIO: f64 = 0.3;

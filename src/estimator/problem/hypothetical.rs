@@ -89,7 +89,7 @@ pub struct HypotheticalLandmark {
 #[derive(Clone, Debug)]
 pub struct HypotheticalWindow {
     pub camera: CameraModel,
-    /// Frames, oldest first.
+    /// Frames of the window, oldest first.
     pub frames: Vec<HypotheticalFrame>,
     pub landmarks: Vec<HypotheticalLandmark>,
     pub poses: PoseKnowledge,
@@ -105,7 +105,7 @@ pub struct HypotheticalWindow {
 impl HypotheticalWindow {
     /// Linearizes the window with the chain in a parameterization; `joint_offsets` adds the joint offsets as columns.
     ///
-    /// Known quantities have no columns. The prior rows are those of the rig's prior only.
+    /// Known quantities have no columns. The prior has the rows of the rig's prior only.
     pub fn linearize(
         &self,
         chain: &ClassicalChain,

@@ -1,6 +1,7 @@
 //! Information gain of the newest image about the calibration, and its attribution to motions.
 //!
-//! The marginal information of the calibration in the window is compared with that of the same window without
+//! The marginal information of the calibration in the window is compared with the information of the same window
+//! without
 //! the factors of the newest image: its observations, IMU interval, encoder readings and zero-velocity update.
 //! With the covariances P and P' of a parameter with and without them the gain is `½ log₂(P'/P)` bits. They add
 //! `G = JcᵀU·UᵀJc`, where `U` is an orthonormal basis of the new rows orthogonal to all states.

@@ -40,8 +40,8 @@ pub struct Linearization {
 }
 
 impl Problem<'_> {
-    /// Linearizes the complete window at an estimate; `parameters` are those of the calibration columns, free or
-    /// fixed. The information of each camera's observations is appended to `seen`, if requested.
+    /// Linearizes the complete window at an estimate; `parameters` are the parameters of the calibration columns, free
+    /// or fixed. The information of each camera's observations is appended to `seen`, if requested.
     pub(crate) fn linearization(
         &self,
         estimate: &Estimate,

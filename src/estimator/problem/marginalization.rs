@@ -58,7 +58,7 @@ fn eliminated<'a>(point: &Point<'_>, parts: impl Iterator<Item = &'a DMatrix<f64
     Prior::eliminating(&rows, &point.layout, slot)
 }
 
-/// Sets missing first estimates of frames in the prior to the current state; removes those of frames outside.
+/// Sets missing first estimates of frames in the prior to the current state; removes first estimates of frames outside.
 pub(crate) fn keep_first_estimates(prior: &Prior, frames: &mut [Frame]) {
     for (slot, frame) in frames.iter_mut().enumerate() {
         if prior.holds_frame(slot) {

@@ -221,7 +221,7 @@ impl NormalEquations {
 }
 
 impl CameraEquations {
-    /// Adds the normal equations of the camera poses to those of the unknowns.
+    /// Adds the normal equations of the camera poses to the normal equations of the unknowns.
     fn add_to(
         &self,
         layout: &Layout,

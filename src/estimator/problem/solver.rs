@@ -22,7 +22,7 @@ use crate::optimization::{Cholesky, DIAGONAL_FLOOR, fix};
 pub struct IterationReport {
     pub cost_before: f64,
     pub cost_after: f64,
-    /// Levenberg–Marquardt damping.
+    /// Damping `λ` of Levenberg–Marquardt, relative to the diagonal.
     pub damping: f64,
     pub step_norm: f64,
     /// True if the step was accepted.

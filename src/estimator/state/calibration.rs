@@ -318,7 +318,7 @@ impl Calibration {
         given.with_intrinsics(intrinsics).map_or(Cow::Borrowed(given), Cow::Owned)
     }
 
-    /// Parameters of all columns, free or not, named as those of the main camera.
+    /// Parameters of all columns, free or not, with the names of the main camera's parameters.
     pub(crate) fn parameters(&self) -> Vec<ParameterId> {
         let mut parameters = self.chain().parameters();
         parameters.extend(self.sensors.iter().map(|column| column.parameter));
@@ -415,7 +415,8 @@ impl Calibration {
         };
     }
 
-    /// Whitened prior residual, one row per column: difference from the rig's values or from those of an earlier pass.
+    /// Whitened prior residual, one row per column: difference from the rig's values or from the values of an earlier
+    /// pass.
     pub(crate) fn prior_residual(&self) -> DVector<f64> {
         if let Some(earlier) = self.given.earlier() {
             let expected = Values { chain: self.given.chain.clone(), sensors: earlier.expected.clone() };
@@ -498,8 +499,8 @@ impl Calibration {
         old_from_new
     }
 
-    /// Values with the standard deviations of the rig's prior, for another flight, and the derivative of their columns by
-    /// those of the estimate.
+    /// Values with the standard deviations of the rig's prior, for another flight, and the derivative of their columns
+    /// by the columns of the estimate.
     ///
     /// `poe` is the only parameterization whose columns depend on the way on which its values were reached.
     pub(crate) fn posterior(&self) -> (CameraPosterior, DMatrix<f64>) {

@@ -19,7 +19,7 @@ pub(crate) const ROLLING_ROWS: [f64; 3] = [0.0, 0.5, 1.0];
 #[derive(Clone, Debug)]
 pub(crate) struct CameraCalibration<'a> {
     pub(crate) chain: Cow<'a, Chain>,
-    /// Number of calibration columns, those of time offset, shutter and intrinsics after the chain; zero when fixed.
+    /// Number of calibration columns: chain, then time offset, shutter and intrinsics; zero when fixed.
     pub(crate) columns: usize,
     /// Time offset in seconds: exposure time of the first row minus stamp.
     pub(crate) shift_s: f64,
@@ -139,7 +139,7 @@ impl CameraMaps {
         maps
     }
 
-    /// Adds the information of the blocks to that of the unknowns (lower triangle).
+    /// Adds the information of the blocks to the information of the unknowns (lower triangle).
     ///
     /// `calibration` is the column range of the camera's calibration; `information` returns the 6 × 6 block at a row
     /// and a column.

@@ -31,7 +31,7 @@ pub(crate) struct CameraView<'a> {
 #[derive(Clone, Debug)]
 enum Poses<'a> {
     Global {
-        /// Poses by slot.
+        /// Pose of each frame by slot.
         poses: Vec<CameraPose>,
         /// Computed at first use: most callers need only the poses.
         relative: OnceCell<RelativePoses>,
@@ -96,7 +96,7 @@ impl<'a> CameraView<'a> {
         &self.model
     }
 
-    /// Unit bearing of a pixel; `nominal` is that of the rig's model.
+    /// Unit bearing of a pixel; `nominal` is its bearing by the rig's model.
     pub(crate) fn bearing(&self, uv_px: &Vector2<f64>, nominal: &Vector3<f64>) -> Vector3<f64> {
         if self.has_intrinsics { self.model.unproject(uv_px).unwrap_or(*nominal) } else { *nominal }
     }

@@ -18,7 +18,7 @@ pub(crate) struct GimbalImuMount {
     pub(crate) rotation_vector: Vector3<f64>,
     /// Time of the measurements minus their stamps, relative to the rig, in seconds.
     pub(crate) shift_s: f64,
-    /// First of the six columns of rotation and position among those of the camera, `None` if they are fixed.
+    /// First of the six columns of rotation and position among the camera's columns, `None` if they are fixed.
     pub(crate) pose_column: Option<usize>,
     /// Column of the time offset, `None` if it is fixed.
     pub(crate) shift_column: Option<usize>,

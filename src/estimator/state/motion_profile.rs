@@ -43,9 +43,9 @@ pub(crate) struct ProfileKnot {
 pub(crate) struct RowMotion {
     /// Rotation from the IMU at that time to the IMU at the stamp, at the given gyroscope bias.
     pub(crate) rotation: UnitQuaternion<f64>,
-    /// As in [`ProfileKnot::velocity_m_per_s`].
+    /// Velocity at that time, as in [`ProfileKnot::velocity_m_per_s`].
     pub(crate) velocity_m_per_s: Vector3<f64>,
-    /// As in [`ProfileKnot::position_m`].
+    /// Position at that time, as in [`ProfileKnot::position_m`].
     pub(crate) position_m: Vector3<f64>,
     /// Angular velocity at that time without bias, in rad/s.
     pub(crate) rate_rad_per_s: Vector3<f64>,

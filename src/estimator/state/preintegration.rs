@@ -38,7 +38,7 @@ struct IntegratedIntrinsics {
 /// Motion of the IMU over an interval from `i` to `j`, in its frame at the start, without gravity and initial velocity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotionIncrement {
-    /// `imu_i_from_imu_j`.
+    /// Rotation `ΔR` = `imu_i_from_imu_j` of the interval.
     pub rotation: UnitQuaternion<f64>,
     /// `R_iᵀ (p_j − p_i − v_i T − g T²/2)` in metres.
     pub position_m: Vector3<f64>,

@@ -1,4 +1,4 @@
-//! Selection of keyframes.
+//! Selection of the window's keyframes.
 
 use super::fixture;
 use super::flight::step;

@@ -34,7 +34,7 @@ impl Feature {
 
 pub(crate) type FeatureMap = BTreeMap<FeatureId, Feature>;
 
-/// Adds the features observed in a frame to those of the camera; skips non-finite ones.
+/// Adds the features observed in a frame to the features of the camera; skips non-finite ones.
 pub(crate) fn observe(features: &mut FeatureMap, slot: usize, seen: &[TrackedFeature]) {
     for tracked in seen {
         let finite = tracked.bearing.iter().chain(tracked.uv_px.iter()).all(|x| x.is_finite());

@@ -248,7 +248,7 @@ struct PackedFeature {
 }
 
 impl PackedFeatures {
-    /// `steps` are those of the window's frames, by slot.
+    /// `steps` are the steps of the window's frames, by slot.
     fn new(features: &FeatureMap, steps: &[Option<&dyn StepMeasurements>], camera: usize) -> Self {
         let count = features.values().map(|feature| feature.observations.len()).sum();
         let mut packed = Self {

@@ -52,7 +52,7 @@ impl Setup {
         (self.config.clock_ms)()
     }
 
-    /// Initial calibration: that of an earlier pass, else that of earlier flights, else that of the rig.
+    /// Initial calibration: the result of an earlier pass, else of earlier flights, else the rig's calibration.
     pub(crate) fn given_calibration(&self) -> Calibrations {
         let mut given = self.rig_calibration();
         if let Some(prior) = &self.config.calibration_prior {

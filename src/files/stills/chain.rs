@@ -18,7 +18,7 @@ const ROTATION_TOLERANCE: f64 = 1e-4;
 /// `initial_chain`, at its top or in `initial_chain`.
 ///
 /// # Errors
-/// If the file cannot be read or its joints or rigid cameras are not those of the stills.
+/// If the file cannot be read or its joints or rigid cameras differ from the joints or rigid cameras of the stills.
 pub fn read_stills_chain(path: &Path, stills: &Stills) -> Result<StillsChain, FileError> {
     let names: Vec<&str> = stills.rigid_cameras.iter().map(|camera| camera.name.as_str()).collect();
     let of_rig = path.extension().is_some_and(|ending| ending == "yaml" || ending == "yml");

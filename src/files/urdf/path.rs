@@ -10,7 +10,7 @@ use crate::gimbal::{ClassicalChain, DhLink, JointAxis};
 use crate::sensors::Joint;
 use crate::text::Named;
 
-/// Chain from the IMU to the camera with known dimensions, such as that of a robot description.
+/// Chain from the IMU to the camera with known dimensions, for example from a robot description.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DescribedChain {
     /// Without links for a rigid camera.

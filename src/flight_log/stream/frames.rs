@@ -28,7 +28,6 @@ pub struct SensorFrame {
     pub stamp_ns: i64,
     /// Log time of the image since the start of the log.
     pub log_time_ns: i64,
-    /// 8-bit gray values.
     pub image: Arc<GrayImage>,
     /// IMU samples from the previous frame's stamp to this one's, both ends included: the first and the last are
     /// interpolated exactly at the stamps (shifted by the rig's `timeshift_cam_imu`).

@@ -161,7 +161,7 @@ fn sides_of_the_solve_and_selection_are_shared_by_all_images() {
     assert_eq!(harness.state().panel.comparisons[1].at(ComparedQuantity::Tracks, at), Some(0.0));
 }
 
-/// A trajectory of another program: that of the first run in another world, alternately 5 cm too high and too low.
+/// A trajectory of another program: the first run's trajectory in another world, alternately 5 cm too high and too low.
 fn with_trajectory(recording: &mut Recording) {
     use nalgebra::{UnitQuaternion, Vector3};
 

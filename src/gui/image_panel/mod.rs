@@ -89,7 +89,7 @@ impl ImagePanel {
         });
     }
 
-    /// Draws the image of a run among those of other runs: label and caption in one line, and the image.
+    /// Draws the image of a run between the images of other runs: label and caption in one line, and the image.
     pub(in crate::gui) fn cell_ui(&mut self, ui: &mut Ui, context: &mut PanelContext<'_>) {
         let Some(run) = context.selected_run() else { return };
         let model = ImageModel::at(run, context.cursor_ns);

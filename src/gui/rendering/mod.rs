@@ -8,7 +8,6 @@ mod mixing;
 pub mod offscreen;
 pub mod painter;
 mod pdf;
-pub(in crate::gui) mod picture_copy;
 pub mod scene_backend;
 mod svg;
 mod vector;

@@ -1,7 +1,7 @@
 //! Paints frames with wgpu like the window, but into a texture that is read back: for comparing graphics drivers with
 //! the CPU painter, and for large screenshots of scenes.
 //!
-//! The bytes of such a screenshot depend on the driver; those of the CPU painter do not.
+//! The bytes of such a screenshot depend on the driver; the bytes of the CPU painter's screenshots do not.
 
 use std::sync::Arc;
 use std::time::Duration;

@@ -226,7 +226,8 @@ pub(super) fn plotted_values(
     Some(area)
 }
 
-/// Draws the values of a lane at the reading cursors and at the pointer's time; `area` is that of [`plotted_values`].
+/// Draws the values of a lane at the reading cursors and at the pointer's time; `area` is the area of
+/// [`plotted_values`].
 pub(super) fn read_values(painter: &Painter, ctx: &PanelContext<'_>, lane: Lane, area: &PlotArea, runs: &[RunLanes]) {
     let Some(column) = lane.column() else { return };
     let lines = read_lines(ctx.theme, runs.iter().map(|lanes| (&*lanes.stamps_ns, &*lanes.columns[column])));

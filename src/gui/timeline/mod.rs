@@ -124,8 +124,8 @@ impl Panel for TimelinePanel {
 }
 
 impl TimelinePanel {
-    /// Height in points of the transport and of all lanes: those of runs and trajectories, and either those of single
-    /// values or the open rows of the parameters.
+    /// Height in points of the transport and of all lanes: the lanes of runs and trajectories, and either the lanes of
+    /// single values or the open rows of the parameters.
     pub(super) fn wanted_height(&self, ui: &Ui, ctx: &PanelContext<'_>) -> f32 {
         let lanes = ctx.recording.runs.len() + ctx.recording.trajectories.len();
         let below = if self.parameters.open {
@@ -156,7 +156,7 @@ impl TimelinePanel {
             .collect()
     }
 
-    /// Width in points of the lane names, large enough for those of the runs.
+    /// Width in points of the lane names, large enough for the names of the runs.
     fn label_width(&self, ui: &Ui, ctx: &PanelContext<'_>) -> f32 {
         const MARGIN: f32 = 10.0;
         let width = |lane: Lane| lanes::name_width(ui, ctx, lane) + MARGIN;

@@ -161,8 +161,8 @@ fn tabs_and_their_bars_are_dragged_and_put_back_by_undo() {
     harness.key_press(Key::Num1);
     harness.run_steps(3);
 
-    // Dragging the empty part of a tab bar moves all its tabs; here those of the convergence to the right edge of the
-    // inspector.
+    // Dragging the empty part of a tab bar moves all its tabs; here the tabs of the convergence to the right edge of
+    // the inspector.
     let (convergence, inspector) =
         (place_of(&harness, PanelName::Calibration), place_of(&harness, PanelName::Inspector));
     let bar = pos2(convergence.right() - 60.0, convergence.top() - 10.0);

@@ -92,7 +92,7 @@ struct Shown {
 
 impl Widths {
     /// Elements that fit into `room` points. The rig is omitted first, then the names of the layouts, the buttons and
-    /// the accuracies; the name of the log and those of the runs are shortened last.
+    /// the accuracies; the names of the log and of the runs are shortened last.
     fn shown(self, room: f32) -> Shown {
         let mut shown =
             Shown { log: self.log, rig: true, buttons: true, accuracy: true, layout_names: true, runs: self.runs[0] };

@@ -39,8 +39,8 @@ impl PairRotation {
 #[derive(Clone, Debug, PartialEq)]
 pub enum RotationReference {
     Gyroscope(AngularRates),
-    /// Orientations `fixed_from_body` at increasing stamps, up to a constant rotation on either side, as from a gimbal's
-    /// joints. Their noise exceeds that of the images: only rotations over longer times are precise.
+    /// Orientations `fixed_from_body` at increasing stamps, up to a constant rotation on either side, as from a
+    /// gimbal's joints. They are noisier than rotations of images: only rotations over longer times are precise.
     Orientations(Vec<(i64, UnitQuaternion<f64>)>),
 }
 

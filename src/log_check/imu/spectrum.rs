@@ -212,7 +212,7 @@ const NOISE_TOO_LARGE: f64 = 30.0;
 /// Ratio of vibration to the white noise of a sample from which it is reported.
 const VIBRATION_RATIO: f64 = 3.0;
 
-/// Compares white noise with the rig's densities, and reports vibration; the spectra are those of gyroscope and
+/// Compares white noise with the rig's densities, and reports vibration; `spectra` has the spectra of gyroscope and
 /// accelerometer.
 pub(super) fn check_noise(spectra: &[Option<Spectrum>; 2], rig: Option<&Rig>, findings: &mut Findings) {
     let noise = rig.map(|rig| &rig.imu.noise);

@@ -82,7 +82,7 @@ pub struct AllanPoint {
 /// Allan deviation of one axis with its noise terms.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct AxisNoise {
-    /// `x`, `y`, `z`.
+    /// Name of the axis: `x`, `y` or `z`.
     pub axis: &'static str,
     /// Ordered by averaging time.
     pub points: Vec<AllanPoint>,
@@ -99,7 +99,7 @@ pub struct GivenNoise {
 /// Allan deviation of one sensor.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SensorNoise {
-    /// `gyroscope` or `accelerometer`.
+    /// Name of the sensor: `gyroscope` or `accelerometer`.
     pub sensor: &'static str,
     /// Unit of the samples.
     pub unit: &'static str,

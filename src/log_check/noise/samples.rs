@@ -86,7 +86,7 @@ const SHORTEST_NS: i64 = 3_000_000_000;
 /// Number of periods between two samples from which the interval is a gap.
 const GAP_PERIODS: f64 = 1.5;
 
-/// Start and end of the stretches in the order of time; the densities are those of the white noise of both sensors.
+/// Start and end of the stretches in the order of time, with the densities of the white noise of both sensors.
 pub(super) fn stationary_stretches(
     rates: &[Stamped],
     forces: &[Stamped],
@@ -151,7 +151,7 @@ pub(super) fn evenly_sampled(samples: &[Stamped], stretches: &[(i64, i64)]) -> (
         }
     }
     parts.retain(|part| part.len() as f64 * usual_s >= 0.5 * seconds_from_ns(SHORTEST_NS));
-    // Stamps may jitter; the mean period is that of the clock.
+    // Stamps may jitter; the mean period is the period of the clock.
     let regular: Vec<f64> = steps.into_iter().filter(|step| *step <= GAP_PERIODS * usual_s).collect();
     let period_s = regular.iter().sum::<f64>() / regular.len().max(1) as f64;
     (parts, period_s)

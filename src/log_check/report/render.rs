@@ -81,7 +81,7 @@ impl Display for CheckReport {
 
 /// Time in seconds, `unset` for one that no clock has.
 fn time_cell(time_s: f64) -> String {
-    /// 63 years: stamps that were never set are farther from those of a log.
+    /// 63 years: stamps that were never set are farther from the stamps of a log.
     const FARTHEST_S: f64 = 2e9;
     if time_s.abs() > FARTHEST_S { "unset".to_owned() } else { without_signed_zeros(format!("{time_s:.3}")) }
 }

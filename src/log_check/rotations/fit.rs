@@ -1,4 +1,5 @@
-//! Image rotations compared with those of gyroscope and chain, weighted by the noise of features, gyroscope and encoders.
+//! Image rotations compared with rotations of gyroscope and chain, weighted by the noise of features, gyroscope and
+//! encoders.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Matrix6xX, UnitQuaternion, Vector3};
 
@@ -12,8 +13,8 @@ use crate::log_check::statistics::{median, percentile};
 const SIGNIFICANT_SIGMAS: f64 = 3.0;
 /// Ratio up to which noise may exceed its stated level: the other checks accept twice the rig's encoder noise.
 const NOISE_TOLERANCE: f64 = 2.0;
-/// Quantile of the misfits that is compared with its prediction, as that of a standard normal number (70 %): up to three
-/// of ten image rotations may be wrong, because points near a plane have two solutions.
+/// Quantile of the misfits that is compared with the same quantile of a standard normal number (70 %): up to three of
+/// ten image rotations may be wrong, because points near a plane have two solutions.
 const COMPARED_QUANTILE: f64 = 0.7;
 const COMPARED_SIGMAS: f64 = 0.5244;
 /// Degrees of freedom of the t distribution of a misfit: a wrong image rotation counts less than its square.
@@ -41,7 +42,7 @@ pub(crate) struct RotationPair {
     pub(crate) middle_s: f64,
     /// Rotation vector `second_from_first` of the images in the camera frame, in radians.
     pub(crate) measured: Vector3<f64>,
-    /// Covariance of `measured` with that of the integrated gyroscope noise, in rad².
+    /// Sum of the covariances of `measured` and of the integrated gyroscope noise (3 × 3), in rad².
     pub(crate) covariance_rad2: Matrix3<f64>,
     /// `second_from_first` of the IMU.
     pub(crate) of_imu: UnitQuaternion<f64>,
@@ -146,7 +147,7 @@ impl RotationPair {
     }
 }
 
-/// Linearized prediction of one rotation; the columns are those of the fit before its orientation is applied.
+/// Linearized prediction of one rotation, with the columns of the fit before its orientation is applied.
 struct Row {
     middle_s: f64,
     measured: Vector3<f64>,
@@ -161,7 +162,7 @@ struct Row {
 }
 
 impl Row {
-    /// The row with further columns, those of this pair.
+    /// The row with further columns, whose values belong to this pair.
     fn with_columns(mut self, pair: usize, extra: &[ExtraColumn]) -> Self {
         let first = self.jacobian.ncols();
         self.jacobian = self.jacobian.resize_horizontally(first + extra.len(), 0.0);
@@ -240,7 +241,7 @@ impl RotationFit {
 struct Fit {
     rows: Vec<Row>,
     orientation: UnitQuaternion<f64>,
-    /// Values of all columns but those of the orientation, which are zero.
+    /// Values of all columns but the columns of the orientation, which are zero.
     values: DVector<f64>,
     prior_information: DVector<f64>,
     /// Number of extra columns, which are the last ones.

@@ -128,7 +128,7 @@ fn check_gaps(role: &str, spacing: &Spacing, of_images: bool, findings: &mut Fin
     findings.add(severity, Area::Time, format!("{role} has gaps"), evidence, remedy);
 }
 
-/// Reports stamps that are those of the arrival: batches, or steps that scatter.
+/// Reports stamps that are taken on arrival: batches, or steps that scatter.
 fn check_jitter(role: &str, spacing: &Spacing, findings: &mut Findings) {
     if let Some(batches) = &spacing.batches {
         let evidence = format!(

@@ -26,7 +26,7 @@ pub(crate) struct AttitudeSurvey {
     /// Rotations of the moving transforms of the path, in the order of log times.
     moved: Vec<(usize, i64, UnitQuaternion<f64>)>,
     vehicle_topic: Option<(String, MessageKind, StampClock)>,
-    /// Ordered by stamp; the stamps are those of the messages.
+    /// Attitudes with the stamps of their messages, ordered by stamp.
     pub(crate) values: Vec<(i64, AttitudeValue)>,
     /// `earth_from_vehicle` as recorded, ordered by stamp.
     pub(crate) vehicle: Vec<(i64, UnitQuaternion<f64>)>,

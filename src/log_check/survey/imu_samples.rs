@@ -11,8 +11,8 @@ use crate::sensors::ImuSample;
 /// Stamps of the messages that are no measurement, by reason.
 pub(crate) type UnmeasuredStamps = BTreeMap<Unmeasured, Vec<i64>>;
 
-/// Samples with all six values in the order of their stamps, from messages in any order; with forces of a separate
-/// `accelerometer` those of the messages are not used, and it is left ordered and without what is no measurement.
+/// Samples with all six values in the order of their stamps, from messages in any order. Specific forces of a separate
+/// `accelerometer` replace the messages' forces; it is left ordered and without invalid measurements.
 pub(crate) fn measured(
     messages: Vec<ImuSample>,
     accelerometer: &mut Vec<(i64, Vector3<f64>)>,

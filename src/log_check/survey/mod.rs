@@ -81,7 +81,7 @@ pub(crate) struct Survey {
     pub(crate) attitude_problem: Option<String>,
     /// Joint angles of `attitude`.
     pub(crate) solved: Vec<SolvedAttitude>,
-    /// Variance of a reading of each joint: the rig's, or that of its white noise if it is larger.
+    /// Variance of a reading of each joint: the rig's variance, or the variance of its white noise if it is larger.
     encoder_variances_rad2: Vec<f64>,
     /// True for joints whose readings are angles in radians, which repeat after a turn.
     wraps: Vec<bool>,

@@ -73,7 +73,7 @@ pub struct LaboratorySetup {
     /// Number of frames, [`FRAME_PERIOD_S`] apart.
     pub frames: usize,
     pub landmarks: usize,
-    /// Columns of sensors in addition to those of the chain.
+    /// Columns of sensors in addition to the columns of the chain.
     pub columns: SensorColumns,
     /// Readout time of the camera's rolling shutter, in seconds; used only with columns of sensors.
     pub readout_s: f64,
@@ -120,8 +120,8 @@ impl LaboratorySetup {
         }
     }
 
-    /// The experiment with columns of sensors; a missing readout time or lens is that of docs/mathematics.md, section
-    /// 11.
+    /// The experiment with columns of sensors; a missing readout time or lens is taken from docs/mathematics.md,
+    /// section 11.
     #[must_use]
     pub fn with_columns(mut self, columns: SensorColumns) -> Self {
         self.columns = columns;

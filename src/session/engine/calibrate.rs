@@ -358,7 +358,7 @@ pub(super) fn with_absolute_shifts(posterior: &CalibrationPosterior, cameras: [&
     absolute
 }
 
-/// Errors of `imu_from_camera` against the ground truth, those of the chain over the joint angles of the log.
+/// Errors of `imu_from_camera` against the ground truth; for a chain, over the joint angles of the log.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CalibrationErrors {
     /// Static camera in the given rig.

@@ -96,7 +96,7 @@ pub(super) enum LoadedTruth {
     Positions(LoadedPositions),
 }
 
-/// The requested ground truth, else that of the rig's topic; `None` if there is neither.
+/// The requested ground truth, else the ground truth of the rig's topic; `None` if there is neither.
 ///
 /// # Errors
 /// If the requested ground truth cannot be read or has nothing within the time of the log, or if a lever arm was given

@@ -76,7 +76,7 @@ impl LostSince {
 }
 
 impl LostSince {
-    /// `unobservable` or `uninformed`.
+    /// Kind for texts: `unobservable` or `uninformed`.
     pub fn kind(self) -> &'static str {
         if self.structural { "unobservable" } else { "uninformed" }
     }

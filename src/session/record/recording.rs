@@ -40,8 +40,8 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// The calibration parameters of its runs: those of their chains in all parameterizations, and those of their last
-    /// steps.
+    /// The calibration parameters of its runs: the parameters of their chains in all parameterizations, and the
+    /// parameters of their last steps.
     pub fn parameters(&self) -> Vec<ParameterId> {
         let mut parameters: Vec<ParameterId> = Vec::new();
         for run in &self.runs {

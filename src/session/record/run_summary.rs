@@ -59,7 +59,7 @@ pub struct ParameterSummary {
 pub struct CalibrationSummary {
     /// Name of the final parameterization.
     pub parameterization: String,
-    /// Number of parameters.
+    /// Number of calibration parameters.
     pub columns: usize,
     /// The parameters in column order.
     pub parameters: Vec<ParameterSummary>,

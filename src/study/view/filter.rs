@@ -19,7 +19,7 @@ pub struct RowFilter {
 /// A property of a row other than a comparison of numbers.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum CellTest {
-    /// A Boolean column.
+    /// Name of a Boolean column.
     Flag(String),
     /// True if a cell is not empty.
     Has(String),

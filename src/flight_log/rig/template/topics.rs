@@ -402,7 +402,8 @@ fn ground_truth_topic(log: &FlightLog) -> Option<String> {
     poses.iter().find(named).map(|info| info.topic.clone())
 }
 
-/// Largest number of joints of a message that is taken for a gimbal's: robots publish those of arms and wheels too.
+/// Largest number of joints of a message that is taken for a gimbal's: robots publish the joints of arms and wheels
+/// too.
 const MOST_JOINTS: usize = 4;
 
 /// Axes in the order of the joints of the first readable `JointState` message; `None` if a name suggests no axis or an

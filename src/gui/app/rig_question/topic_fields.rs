@@ -146,7 +146,7 @@ impl TopicFields {
         self.by_flags() || self.has_attitudes() && self.frame != AttitudeFrame::Body
     }
 
-    /// Draws the rows of a grid with two columns; those of the angles only for a gimbal.
+    /// Draws the rows of a grid with two columns; the rows of the angles only for a gimbal.
     pub(super) fn ui(&mut self, ui: &mut Ui, gimbal: bool, width: f32) {
         if self.images.len() > 1 {
             topic_ui(ui, "Images", &mut self.image, &self.images, width);

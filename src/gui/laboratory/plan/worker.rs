@@ -87,12 +87,12 @@ impl MotionSigmas {
         }
     }
 
-    /// The last prediction, which may be that of an earlier request.
+    /// The last prediction, which may belong to an earlier request.
     pub(super) fn last(&self) -> Option<&MotionPrediction> {
         self.last.as_ref()
     }
 
-    /// True if the last prediction is that of an earlier request.
+    /// True if the last prediction belongs to an earlier request.
     #[cfg(test)]
     pub(super) fn is_busy(&self) -> bool {
         self.thread.is_some()

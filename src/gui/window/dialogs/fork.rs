@@ -179,7 +179,8 @@ fn labelled() -> impl Iterator<Item = (&'static Key<ForkChanges>, &'static Label
     ForkChanges::KEYS.iter().filter_map(|key| Some((key, key.label.as_ref()?)))
 }
 
-/// Keys of the sensor parameters that the run at the cursor can estimate: those of the IMU on the gimbal only if it has one.
+/// Keys of the sensor parameters that the run at the cursor can estimate; keys of the IMU on the gimbal only if it has
+/// one.
 fn sensors_of(ctx: &PanelContext<'_>) -> Vec<&'static str> {
     let newest = ctx.selected_step().and_then(|(_, step)| step.report.newest());
     let has_gimbal_imu = newest.is_some_and(|newest| newest.gimbal_imu.is_some());

@@ -35,7 +35,7 @@ pub struct SensorSurveyRow {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct SensorSurveyEntry {
     pub columns: String,
-    /// Number of columns, those of the chain included.
+    /// Number of columns, including the columns of the chain.
     pub count: usize,
     pub rank: usize,
     /// Number of null directions that the chain alone does not have.
@@ -98,7 +98,7 @@ fn lost(rank: &SetRank) -> Vec<String> {
     sensors.filter(|(column, _)| takes_part(*column)).map(|(_, parameter)| names.name(*parameter)).collect()
 }
 
-/// Names, those of one sensor grouped after its name: `gyroscope.sx sy, readout`.
+/// Names of columns; names of one sensor are grouped after its name: `gyroscope.sx sy, readout`.
 fn grouped(names: &[String]) -> String {
     let mut text = String::new();
     let mut last = "";

@@ -9,7 +9,7 @@ use crate::observability::analysis::measured_block;
 use crate::observability::directions::weak_directions;
 use crate::observability::laboratory::SensorColumns;
 
-/// Rank for one set of columns, those of the chain included.
+/// Rank for one set of columns, including the columns of the chain.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct SetRank {
     pub(crate) columns: SensorColumns,
