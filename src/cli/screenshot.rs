@@ -30,7 +30,7 @@ use crate::cli::prepared_log::{prepared_log, prepared_session};
 use crate::cli::report::own_command_line;
 use crate::cli::result_cache::{CacheArguments, CachedResult};
 use crate::cli::shared_arguments::{seconds, sides};
-use crate::cli::study_arguments::{StudyArguments, StudyPicture, write_study_picture};
+use crate::cli::study_arguments::{StudyArguments, StudyScreenshot, write_study_screenshot};
 use crate::cli::terminal::{notify, print};
 
 #[derive(Args, Clone, Debug)]
