@@ -8,6 +8,7 @@
 //! | --- | --- | --- |
 //! | [`text`] | `KEY=VALUE` entries, tables of keys, conditions, names of enums | what the keys mean |
 //! | [`geometry`] | rotations, rigid transforms, the one perturbation rule, time units | cameras, logs |
+//! | [`table`] | columns with name, unit, meaning, value, order and look; tables as CSV | the meaning of the rows |
 //! | [`camera`] | projection and back-projection with their Jacobians | gimbals, images |
 //! | [`gimbal`] | the actuated chain in each parameterization, its Jacobians, conversions and singularity margins | measurements |
 //! | [`sensors`] | plain types of sensor measurements and of the rig that describes the sensors | the source of the data |
@@ -120,4 +121,5 @@ pub mod simulation;
 pub mod study;
 #[cfg(feature = "logs")]
 pub mod sweep;
+pub mod table;
 pub mod text;

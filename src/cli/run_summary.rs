@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use dcvins::observability::{Determination, MIN_SPURIOUS_GAIN};
-use dcvins::session::{FlightParameter, KnownLossSummary, RunSummary, StageSummary, TrajectoryLane, least_determined};
+use dcvins::session::{FlightParameter, KnownLossSummary, RunSummary, TrajectoryLane, least_determined};
 use dcvins::text::Named as _;
 
 /// Text of a trajectory of another program for the terminal.
@@ -73,17 +73,12 @@ pub(crate) fn describe(folder: &Path, summary: &RunSummary) -> String {
         }));
     }
     if let (Some(timing), Some(factor)) = (&summary.timing_ms, summary.real_time_factor) {
-        let stage = |stage: &StageSummary| format!("{:.1}/{:.1}", stage.p50, stage.p95);
-        lines.push(format!(
-            "  ms p50/p95   front end {}, optimize {}, linearize {}, report {}, marginalize {}, observability {}, step {}; {factor:.1} × real time\n",
-            stage(&timing.frontend),
-            stage(&timing.optimize),
-            stage(&timing.linearize),
-            stage(&timing.report),
-            stage(&timing.marginalize),
-            stage(&timing.observability),
-            stage(&timing.step)
-        ));
+        let stages = timing.0.iter().map(|(key, stage)| {
+            let name = if *key == "frontend" { "front end" } else { key };
+            format!("{name} {:.1}/{:.1}", stage.p50, stage.p95)
+        });
+        let stages = stages.collect::<Vec<_>>().join(", ");
+        lines.push(format!("  ms p50/p95   {stages}; {factor:.1} × real time\n"));
     }
     for warning in &summary.warnings {
         lines.push(format!("  warning      {warning}\n"));

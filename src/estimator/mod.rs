@@ -38,7 +38,7 @@ pub use problem::solver::IterationReport;
 pub use report::{
     CalibrationEstimate, Event, EventKind, FactorRows, FailureCause, FeatureCounts, FeatureReport, FrameStateReport,
     JacobianFactor, JacobianRow, JacobianSource, LandmarkReport, ObservationReport, Observations, Phase,
-    PoseCovariance, ReportBytes, ResidualSummary, StageTimes, StepReport, StepWarning,
+    PoseCovariance, ReportBytes, ResidualSummary, Stage, StageTimes, StepReport, StepWarning,
 };
 pub use state::allocation::allocated_bytes;
 pub use state::calibration::INACCURATE_ROTATION_RAD;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::calibration_report::CalibrationReport;
 use super::error::ExportError;
-use super::folder_files::{remove_others, write_files};
+use super::folder_files::{json_text, remove_others, write_files};
 use super::masks;
 use super::posterior::{POSTERIOR, posterior_of_calibration};
 use super::trajectory::{covariance_of_calibration, tum_of_calibration};
@@ -24,13 +24,12 @@ pub fn write_calibration(
     folder: &Path,
     trajectory: bool,
 ) -> Result<(), ExportError> {
-    let json = serde_json::to_string_pretty(report)
-        .map_err(|source| ExportError::Write { source: source.into(), path: folder.join("calibration.json") })?;
+    let json = json_text(report, &folder.join("calibration.json"))?;
     let sigmas = report.parameters.iter().map(|it| (it.name.as_str(), it.dimension, it.sigma));
     let mut rig = run.rig.clone();
     let masks = masks::beside(&mut rig)?;
     let mut files = vec![
-        ("calibration.json", format!("{json}\n")),
+        ("calibration.json", json),
         ("rig.yaml", format!("{}{}", rig.to_yaml(), sigmas_yaml(&report.parameterization, sigmas))),
         ("report.txt", report.to_string()),
         (POSTERIOR, posterior_of_calibration(run)),

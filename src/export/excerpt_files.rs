@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::error::ExportError;
-use super::folder_files::write_files;
+use super::folder_files::{json_text, write_files};
 use super::masks;
 use crate::files::output;
 use crate::flight_log::{FlightLog, LogWriterOptions, write_excerpt};
@@ -158,9 +158,8 @@ pub fn write_stretches(
 /// # Errors
 /// If the file cannot be written.
 pub fn write_excerpt_index(summary: &ExcerptSummary, folder: &Path) -> Result<(), ExportError> {
-    let json = serde_json::to_string_pretty(summary)
-        .map_err(|source| ExportError::Write { source: source.into(), path: folder.join(INDEX) })?;
-    write_files([(INDEX, format!("{json}\n"))], folder).map(drop)
+    let json = json_text(summary, &folder.join(INDEX))?;
+    write_files([(INDEX, json)], folder).map(drop)
 }
 
 impl Display for ExcerptSummary {

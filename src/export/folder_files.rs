@@ -3,6 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use serde::Serialize;
+
 use super::error::ExportError;
 use crate::files::output::OutputSet;
 
@@ -21,6 +23,13 @@ pub(super) fn write_files<N: AsRef<Path>, C: AsRef<[u8]>>(
     }
     outputs.commit().map_err(ExportError::commit)?;
     Ok(paths)
+}
+
+/// Text of a JSON file.
+pub(crate) fn json_text(value: &impl Serialize, path: &Path) -> Result<String, ExportError> {
+    let json = serde_json::to_string_pretty(value);
+    let json = json.map_err(|source| ExportError::Write { source: source.into(), path: path.to_owned() })?;
+    Ok(format!("{json}\n"))
 }
 
 /// Removes the files with these names in a folder that are not among `written`: they belong to an earlier result.

@@ -9,7 +9,7 @@ mod excerpt_files;
 pub(crate) mod existing;
 pub(crate) mod file_hash;
 mod flight_noise;
-mod folder_files;
+pub(crate) mod folder_files;
 pub(crate) mod masks;
 mod motion_csv;
 mod noise_files;

@@ -7,9 +7,9 @@ use std::path::Path;
 use nalgebra::Vector3;
 
 use super::error::ExportError;
-use crate::files::csv_writer::{CsvWriter, number_cell};
 use crate::files::output;
 use crate::simulation::{MotionSample, MotionSplines, PrescribedMotion};
+use crate::table::csv_text;
 
 /// Columns before and after the columns of the joints.
 const TIME: &str = "t_s";
@@ -25,15 +25,14 @@ const LARGEST_BYTES: u64 = 64 << 20;
 pub(super) fn motion_csv(motion: &MotionSplines, joint_names: &[String]) -> String {
     let joints = joint_names.iter().map(|name| format!("{name}{JOINT_UNIT}"));
     let header = [TIME.to_owned()].into_iter().chain(joints).chain(VEHICLE.map(str::to_owned));
-    let mut table = CsvWriter::new(header);
     let steps = (motion.duration_s() / STEP_S - 1e-9).ceil().max(1.0) as usize;
-    for step in 0..=steps {
+    let rows = (0..=steps).map(|step| {
         let time_s = motion.duration_s() * step as f64 / steps as f64;
         let MotionSample { joints_rad, position_m, heading_rad, .. } = motion.sample(time_s);
         let numbers = [time_s].into_iter().chain(joints_rad).chain(position_m.iter().copied()).chain([heading_rad]);
-        table.row(numbers.map(number_cell));
-    }
-    table.into_text()
+        numbers.map(|number| number.to_string()).collect::<Vec<_>>()
+    });
+    csv_text(header, rows)
 }
 
 /// Writes a motion into a new CSV file, and creates its folder if necessary.

@@ -7,8 +7,8 @@ use super::flight_noise::FlightNoiseReport;
 #[cfg(feature = "gui")]
 use super::folder_files::figure_files;
 use super::folder_files::write_files;
-use crate::files::csv_writer::{CsvWriter, number_cell};
-use crate::log_check::AllanReport;
+use crate::log_check::{AllanPoint, AllanReport};
+use crate::table::{Column, csv};
 
 const TABLE: &str = "allan.csv";
 const RIG_LINES: &str = "imu0.yaml";
@@ -20,21 +20,20 @@ const SVG: &str = "allan.svg";
 
 /// Points of all axes, one row each.
 fn table(report: &AllanReport) -> String {
-    let mut table =
-        CsvWriter::new(["sensor", "axis", "tau_s", "deviation", "sigma", "low", "high", "fitted", "vibration"]);
-    for sensor in &report.sensors {
-        for axis in &sensor.axes {
-            for point in &axis.points {
-                let numbers = [point.tau_s, point.deviation, point.sigma, point.low, point.high];
-                let mut row = vec![sensor.sensor.to_owned(), axis.axis.to_owned()];
-                row.extend(numbers.map(number_cell));
-                row.push(point.model.map_or_else(String::new, number_cell));
-                row.push(u8::from(point.vibration).to_string());
-                table.row(row);
-            }
-        }
-    }
-    table.into_text()
+    type PointColumn<'a> = Column<'a, (&'static str, &'static str, &'a AllanPoint)>;
+    let columns = [
+        PointColumn::new("sensor", |(sensor, ..)| *sensor),
+        PointColumn::new("axis", |(_, axis, _)| *axis),
+        PointColumn::new("tau_s", |(.., point)| point.tau_s),
+        PointColumn::new("deviation", |(.., point)| point.deviation),
+        PointColumn::new("sigma", |(.., point)| point.sigma),
+        PointColumn::new("low", |(.., point)| point.low),
+        PointColumn::new("high", |(.., point)| point.high),
+        PointColumn::new("fitted", |(.., point)| point.model),
+        PointColumn::new("vibration", |(.., point)| usize::from(point.vibration)),
+    ];
+    let axes = report.sensors.iter().flat_map(|sensor| sensor.axes.iter().map(move |axis| (sensor.sensor, axis)));
+    csv(&columns, axes.flat_map(|(sensor, axis)| axis.points.iter().map(move |point| (sensor, axis.axis, point))))
 }
 
 /// Writes `allan.csv`, `imu0.yaml` and `noise.json` into a folder, in a build with the window also `allan.png` and

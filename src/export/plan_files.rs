@@ -7,12 +7,12 @@ use serde::Serialize;
 
 use super::error::ExportError;
 use super::existing::read_index;
-use super::folder_files::{remove_others, write_files};
+use super::folder_files::{json_text, remove_others, write_files};
 use super::motion_csv::motion_csv;
-use crate::files::csv_writer::{CsvWriter, number_cell};
 use crate::files::output;
-use crate::observability::laboratory::{HandPlan, MotionPlan, PlanTable, SigmaRow};
+use crate::observability::laboratory::{HandPlan, MotionPlan, PlanTable, PlannedParameter, SigmaRow};
 use crate::simulation::MotionSplines;
+use crate::table::{Column, csv};
 use crate::text::{printable, shortened};
 
 const INDEX: &str = "plan.json";
@@ -117,13 +117,9 @@ pub fn check_plan_folder(folder: &Path, rig: &str, force: bool) -> Result<(), Ex
 /// # Errors
 /// If the folder or a file cannot be written.
 pub fn write_plan(report: &PlanReport, joint_names: &[String], folder: &Path) -> Result<Vec<PathBuf>, ExportError> {
-    let json = serde_json::to_string_pretty(report)
-        .map_err(|source| ExportError::Write { source: source.into(), path: folder.join(INDEX) })?;
-    let mut files = vec![
-        (INDEX, format!("{json}\n")),
-        (TEXT, report.to_string()),
-        (SIGMAS, sigma_csv(report.plan.table(), report.plan.sigmas())),
-    ];
+    let json = json_text(report, &folder.join(INDEX))?;
+    let mut files =
+        vec![(INDEX, json), (TEXT, report.to_string()), (SIGMAS, sigma_csv(report.plan.table(), report.plan.sigmas()))];
     files.push((MOTION, motion_csv(report.plan.motion(), joint_names)));
     if let PlannedFlight::Motion(plan) = &report.plan {
         files.extend(plan.listed.as_ref().map(|listed| (LISTED, motion_csv(&listed.motion, joint_names))));
@@ -135,17 +131,34 @@ pub fn write_plan(report: &PlanReport, joint_names: &[String], folder: &Path) ->
 
 /// Predicted σ over time, one row per time and parameter.
 fn sigma_csv(table: &PlanTable, rows: &[SigmaRow]) -> String {
-    let mut csv = CsvWriter::new(["t_s", "parameter", "unit", "sigma", "ratio"]);
-    for row in rows {
-        for (parameter, (sigma, ratio)) in table.parameters.iter().zip(&row.sigmas) {
-            csv.row([
-                number_cell(row.time_s),
-                parameter.name.clone(),
-                parameter.dimension.unit().to_owned(),
-                number_cell(*sigma),
-                number_cell(*ratio),
-            ]);
-        }
+    let of_time = |row: &SigmaRow| {
+        let sigmas = row.sigmas.iter().copied().zip(&table.parameters);
+        let time_s = row.time_s;
+        sigmas.map(move |((sigma, ratio), parameter)| (time_s, parameter, sigma, ratio)).collect::<Vec<_>>()
+    };
+    csv(&sigma_columns(), rows.iter().flat_map(of_time))
+}
+
+/// Columns of time, parameter, σ and ratio.
+fn sigma_columns<'a>() -> [Column<'a, (f64, &'a PlannedParameter, f64, f64)>; 5] {
+    type SigmaColumn<'a> = Column<'a, (f64, &'a PlannedParameter, f64, f64)>;
+    [
+        SigmaColumn::new("t_s", |(time_s, ..)| *time_s).means("s", "time of the motion"),
+        SigmaColumn::new("parameter", |(_, parameter, ..)| parameter.name.as_str()).means("", "name of the parameter"),
+        SigmaColumn::new("unit", |(_, parameter, ..)| parameter.dimension.unit()).means("", "unit of sigma"),
+        SigmaColumn::new("sigma", |(_, _, sigma, _)| *sigma).means("", "predicted standard deviation"),
+        SigmaColumn::new("ratio", |(.., ratio)| *ratio).means("", "sigma over prior sigma"),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::table::documented;
+
+    #[test]
+    fn the_documents_list_the_columns() {
+        let table = documented(&sigma_columns());
+        assert!(include_str!("../../docs/formats.md").contains(&table), "docs/formats.md lacks the table:\n{table}");
     }
-    csv.into_text()
 }

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::error::ExportError;
-use super::folder_files::remove_others;
+use super::folder_files::{json_text, remove_others};
 use super::masks;
 use super::posterior::{POSTERIOR, posterior_of_run};
 use super::results::stage_results;
@@ -64,13 +64,12 @@ pub(crate) fn stage_run(
     let folder = folder.join(&run.spec.label);
     fs::create_dir_all(&folder).map_err(ExportError::write(&folder))?;
     let summary = summarize(recording, run, options.timing);
-    let json = serde_json::to_string_pretty(&summary)
-        .map_err(|source| ExportError::Write { source: source.into(), path: folder.join("summary.json") })?;
+    let json = json_text(&summary, &folder.join("summary.json"))?;
     let mut rig = run.calibrated_rig(&recording.rig);
     let masks = masks::beside(&mut rig)?;
     // The summary contains the name of the log, so it is the first file.
     let mut files = vec![
-        ("summary.json", format!("{json}\n")),
+        ("summary.json", json),
         ("trajectory.tum", tum_of_run(run, recording.epoch_ns)),
         ("covariance.csv", covariance_csv(run)),
         ("calibration.csv", calibration_csv(run, &recording.rig)),

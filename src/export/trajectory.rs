@@ -7,12 +7,11 @@ use std::path::Path;
 use nalgebra::{Matrix6, Vector4};
 
 use super::error::ExportError;
-use super::tables::optional_cell;
-use crate::files::csv_writer::{CsvWriter, number_cell, seconds_cell};
 use crate::flight_log::{BATCH_REFERENCE, LogError, RecordedPose, read_trajectory_file};
 use crate::geometry::{RigidTransform, seconds_from_ns};
 use crate::session::accuracy::StampedPose;
 use crate::session::{CalibrationRun, RunRecord};
+use crate::table::{Column, Stamp, csv, csv_text};
 
 /// Columns of EuRoC's `state_groundtruth_estimate0`: stamp, position, orientation, velocity and biases.
 pub(super) const EUROC_COLUMNS: [&str; 17] = [
@@ -75,17 +74,16 @@ fn tum(poses: impl Iterator<Item = (i64, RigidTransform)>, epoch_ns: i64) -> Str
 /// Trajectory of a run as a table like EuRoC's `state_groundtruth_estimate0`: stamp in nanoseconds, position,
 /// orientation (w first) and velocity of the IMU in the estimator's world, gyroscope and accelerometer bias.
 pub fn euroc_of_run(run: &RunRecord, epoch_ns: i64) -> String {
-    let mut table = CsvWriter::new(EUROC_COLUMNS);
-    for newest in run.steps.iter().filter_map(|step| step.report.newest()) {
+    let rows = run.steps.iter().filter_map(|step| step.report.newest()).map(|newest| {
         let rotation = newest.world_from_imu.rotation.quaternion();
         let orientation = Vector4::new(rotation.w, rotation.i, rotation.j, rotation.k);
         let stamp_ns = i128::from(epoch_ns) + i128::from(newest.stamp_ns);
         let numbers = newest.world_from_imu.translation_m.iter().chain(&orientation).chain(&newest.velocity_m_per_s);
         let numbers = numbers.chain(&newest.gyroscope_bias_rad_per_s).chain(&newest.accelerometer_bias_m_per_s2);
         let cells = numbers.map(|number| format!("{number:.9}"));
-        table.row(std::iter::once(stamp_ns.to_string()).chain(cells));
-    }
-    table.into_text()
+        std::iter::once(stamp_ns.to_string()).chain(cells).collect::<Vec<_>>()
+    });
+    csv_text(EUROC_COLUMNS, rows)
 }
 
 /// Reads a trajectory in TUM's or EuRoC's format, see [`read_trajectory_file`]. Every pose must have an attitude.
@@ -130,25 +128,22 @@ pub(super) fn covariance_of_calibration(run: &CalibrationRun) -> String {
     table(poses, false)
 }
 
+/// Stamp, covariance and normalized squared error of a pose.
+type CovarianceRow = (i64, Matrix6<f64>, Option<f64>);
+type PoseColumn = Column<'static, CovarianceRow>;
+
 /// Upper triangle of each covariance in the order of ROS messages: position before rotation, both about the world axes;
 /// with `with_nees` also the normalized squared error.
-fn table(poses: impl Iterator<Item = (i64, Matrix6<f64>, Option<f64>)>, with_nees: bool) -> String {
+fn table(poses: impl Iterator<Item = CovarianceRow>, with_nees: bool) -> String {
     const AXES: [(&str, &str); 6] = [("x", "m"), ("y", "m"), ("z", "m"), ("rx", "rad"), ("ry", "rad"), ("rz", "rad")];
-    let upper = || (0..AXES.len()).flat_map(|row| (row..AXES.len()).map(move |column| (row, column)));
-    let name = |(row, column): (usize, usize)| {
-        let ((first, unit), (second, other_unit)) = (AXES[row], AXES[column]);
+    let upper = (0..AXES.len()).flat_map(|row| (row..AXES.len()).map(move |column| (row, column)));
+    let name = |(row, column): &(usize, usize)| {
+        let ((first, unit), (second, other_unit)) = (AXES[*row], AXES[*column]);
         let unit = if unit == other_unit { format!("{unit}2") } else { format!("{unit}_{other_unit}") };
         format!("{first}_{second}_{unit}")
     };
-    let mut header = vec!["t_s".to_owned()];
-    header.extend(upper().map(name));
-    header.extend(with_nees.then(|| "nees".to_owned()));
-    let mut table = CsvWriter::new(header);
-    for (stamp_ns, covariance, nees) in poses {
-        let mut row = vec![seconds_cell(stamp_ns)];
-        row.extend(upper().map(|place| number_cell(covariance[place])));
-        row.extend(with_nees.then(|| optional_cell(nees.as_ref())));
-        table.row(row);
-    }
-    table.into_text()
+    let mut columns = vec![PoseColumn::new("t_s", |(stamp_ns, ..)| Stamp(*stamp_ns))];
+    columns.extend(PoseColumn::each(upper, name, |(_, covariance, _), place| covariance[*place]));
+    columns.extend(with_nees.then(|| PoseColumn::new("nees", |(.., nees)| *nees)));
+    csv(&columns, poses)
 }

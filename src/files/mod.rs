@@ -1,6 +1,5 @@
 //! Files that are no logs: rigs, stills, robot descriptions and tables, read within limits and written atomically.
 
-pub mod csv_writer;
 mod error;
 pub(crate) mod image_file;
 pub(crate) mod limits;

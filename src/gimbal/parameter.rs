@@ -1,6 +1,7 @@
 //! Identity of a calibration parameter and its name.
 
 use crate::geometry::{Dimension, principal_angle};
+use crate::table::Shown;
 use crate::text::Named;
 
 /// A scalar parameter of the static calibration: one column of its Jacobian.
@@ -144,6 +145,14 @@ impl ParameterId {
         match self.group() {
             ParameterGroup::Imu => IMU_INTRINSICS,
             _ => self.dimension().scale(),
+        }
+    }
+
+    /// Shown unit: that of the dimension, or percent for scale and misalignment of the IMU.
+    pub const fn shown(self) -> Shown {
+        match (self.group(), self.dimension()) {
+            (ParameterGroup::Imu, Dimension::Ratio) => Shown { factor: 100.0, unit: " %" },
+            (_, dimension) => Shown::of(dimension),
         }
     }
 

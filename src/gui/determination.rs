@@ -7,14 +7,8 @@ use crate::observability::{DETERMINED_RATIO, Determination, NOT_DETERMINED_RATIO
 
 /// Symbol and colour of a verdict; the symbol is unique without the colour.
 pub(crate) fn look_of(verdict: Determination, theme: &Theme) -> (&'static str, Color32) {
-    match verdict {
-        Determination::Determined => ("✔", theme.ok),
-        Determination::WeaklyDetermined => ("⚠", theme.warn),
-        Determination::NotDetermined => ("✖", theme.error),
-        Determination::Redundant => ("=", theme.text_weak),
-        Determination::Fixed => ("–", theme.text_weak),
-        Determination::Initializing => ("…", theme.text_weak),
-    }
+    let (mark, tone) = verdict.look();
+    (mark, theme.tone(tone))
 }
 
 /// Number of levels of [`level_of`].

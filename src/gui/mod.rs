@@ -29,6 +29,7 @@ pub mod residuals;
 pub(crate) mod samples;
 pub mod scene;
 pub mod study;
+mod table;
 #[cfg(test)]
 pub(crate) mod tests;
 pub mod theme;

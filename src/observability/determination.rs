@@ -2,6 +2,7 @@
 
 use serde::{Serialize, Serializer};
 
+use crate::table::{Medium, Tone};
 use crate::text::Named;
 
 /// Ratio of posterior and prior σ below which a parameter is determined: nine tenths of its information come from the
@@ -70,6 +71,42 @@ impl Determination {
     /// True if motion or further sensors can improve the parameter.
     pub fn is_improvable(self) -> bool {
         matches!(self, Self::WeaklyDetermined | Self::NotDetermined)
+    }
+
+    /// Severity of the verdict: largest for a parameter that the flight does not determine.
+    pub fn severity(self) -> u8 {
+        match self {
+            Self::NotDetermined => 5,
+            Self::WeaklyDetermined => 4,
+            Self::Redundant => 3,
+            Self::Determined => 2,
+            Self::Fixed => 1,
+            Self::Initializing => 0,
+        }
+    }
+
+    /// Symbol and emphasis on a screen; the symbol is unique without the emphasis.
+    pub const fn look(self) -> (&'static str, Tone) {
+        match self {
+            Self::Determined => ("✔", Tone::Good),
+            Self::WeaklyDetermined => ("⚠", Tone::Caution),
+            Self::NotDetermined => ("✖", Tone::Bad),
+            Self::Redundant => ("=", Tone::Weak),
+            Self::Fixed => ("–", Tone::Weak),
+            Self::Initializing => ("…", Tone::Weak),
+        }
+    }
+
+    pub const fn tone(self) -> Tone {
+        self.look().1
+    }
+
+    /// Name, on a screen after the symbol.
+    pub fn shown(self, medium: Medium) -> String {
+        match medium {
+            Medium::Screen => format!("{} {}", self.look().0, self.name()),
+            Medium::Page => self.name().to_owned(),
+        }
     }
 }
 

@@ -6,6 +6,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::content::{ReportDrawing, ReportFigure};
 use super::verdict::StatementLevel;
+use crate::table::{Column, Medium};
 
 /// Maximum number of rows of a table that is not split between printed pages.
 const MAX_UNBROKEN_ROWS: usize = 14;
@@ -51,12 +52,26 @@ pub(super) fn is_number(cell: &str) -> bool {
     cell.starts_with(|first: char| first.is_ascii_digit() || "−-±".contains(first))
 }
 
+/// Texts of a row on a page.
+pub(super) fn cells<Row>(columns: &[Column<'_, Row>], row: &Row) -> Vec<String> {
+    columns.iter().map(|column| column.shown_text(row, Medium::Page)).collect()
+}
+
 /// A table whose first column contains the names of the rows.
-pub(super) fn table<S: AsRef<str>>(caption: &str, header: &[S], rows: &[Vec<String>]) -> Markup {
+pub(super) fn table<Row>(caption: &str, columns: &[Column<'_, Row>], rows: &[Row]) -> Markup {
+    let texts: Vec<Vec<String>> = rows.iter().map(|row| cells(columns, row)).collect();
+    table_of_texts(caption, columns.iter().filter_map(|column| column.heading(Medium::Page)), &texts)
+}
+
+pub(super) fn table_of_texts<'a>(
+    caption: &str,
+    header: impl IntoIterator<Item = &'a str>,
+    rows: &[Vec<String>],
+) -> Markup {
     html! {
         table.short[rows.len() <= MAX_UNBROKEN_ROWS] {
             caption { (caption) }
-            thead { tr { @for cell in header { th scope="col" { (cell.as_ref()) } } } }
+            thead { tr { @for cell in header { th scope="col" { (cell) } } } }
             tbody {
                 @for row in rows {
                     tr {
@@ -142,8 +157,9 @@ mod tests {
 
     #[test]
     fn what_a_log_says_cannot_become_markup() {
-        let text = table("a & b", &["<name>"], &[vec!["<script>alert(\"x\")</script>".to_owned(), "-1".to_owned()]])
-            .into_string();
+        let text =
+            table_of_texts("a & b", ["<name>"], &[vec!["<script>alert(\"x\")</script>".to_owned(), "-1".to_owned()]])
+                .into_string();
         assert!(!text.contains("<script>") && text.contains("&lt;script&gt;"), "{text}");
         assert!(text.contains("a &amp; b") && text.contains("&lt;name&gt;"), "{text}");
         assert!(text.contains("<td class=\"number\">-1</td>"), "{text}");
@@ -163,7 +179,7 @@ mod tests {
     #[test]
     fn only_hashes_are_broken_inside_words_and_topics_after_slashes() {
         let hash = "0123456789abcdef0123456789abcdef01234567".to_owned();
-        let text = table("t", &["a", "b"], &[vec!["/imu/data".to_owned(), hash.clone()]]).into_string();
+        let text = table_of_texts("t", ["a", "b"], &[vec!["/imu/data".to_owned(), hash.clone()]]).into_string();
         assert!(text.contains("<th scope=\"row\">/<wbr>imu/<wbr>data</th>"), "{text}");
         assert!(text.contains(&format!("<td class=\"hash\">{hash}</td>")), "{text}");
     }

@@ -22,6 +22,7 @@ use serde_json::Value;
 pub use study::{StudyReport, check_study_report, write_study_report};
 
 use crate::export::existing::{RUN_FILES, check_run_folder, read_index};
+use crate::export::folder_files::json_text;
 use crate::export::run_files::{remove_unwritten, stage_run};
 use crate::export::{CachedFile, ExportError, RunFileOptions};
 use crate::files::output::OutputSet;
@@ -51,9 +52,8 @@ pub fn write_report(
     let content = ReportContent::new(recording, summaries, inputs, options);
     let json_path = folder.join("report.json");
     let earlier_runs = labels_in(&json_path);
-    let json = serde_json::to_string_pretty(&content)
-        .map_err(|source| ExportError::Write { source: source.into(), path: json_path.clone() })?;
-    outputs.write(&json_path, format!("{json}\n").as_bytes()).map_err(ExportError::write(&json_path))?;
+    let json = json_text(&content, &json_path)?;
+    outputs.write(&json_path, json.as_bytes()).map_err(ExportError::write(&json_path))?;
     let path = folder.join("report.html");
     let page = page::page(&content, &options.figures);
     outputs.write(&path, page.as_bytes()).map_err(ExportError::write(&path))?;

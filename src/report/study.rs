@@ -11,9 +11,11 @@ use super::html::{document, figure, table};
 use super::numbers::number;
 use crate::export::ExportError;
 use crate::export::existing::read_index;
+use crate::export::folder_files::json_text;
 use crate::files::output;
 use crate::files::output::OutputSet;
 use crate::study::view::{GroupSummary, ParameterErrors};
+use crate::table::Column;
 
 /// File that identifies the report of a study.
 const INDEX: &str = "report.json";
@@ -70,10 +72,9 @@ pub fn write_study_report(report: &StudyReport, folder: &Path) -> Result<PathBuf
     fs::create_dir_all(folder).map_err(ExportError::write(folder))?;
     let mut outputs = OutputSet::default();
     let json_path = folder.join(INDEX);
-    let json = serde_json::to_string_pretty(report)
-        .map_err(|source| ExportError::Write { source: source.into(), path: json_path.clone() })?;
+    let json = json_text(report, &json_path)?;
     let path = folder.join("report.html");
-    let mut files = vec![(json_path, format!("{json}\n")), (path.clone(), page(report))];
+    let mut files = vec![(json_path, json), (path.clone(), page(report))];
     files.extend(report.tables.iter().map(|(name, text)| (folder.join(format!("{name}.csv")), text.clone())));
     for (path, text) in &files {
         outputs.write(path, text.as_bytes()).map_err(ExportError::write(path))?;
@@ -120,75 +121,48 @@ fn lead(report: &StudyReport) -> String {
 
 /// Success, quantiles and differences of each group.
 fn groups(report: &StudyReport) -> Markup {
+    type GroupColumn<'a> = Column<'a, GroupSummary>;
     let significant = |value: f64| {
         let decimals = if value == 0.0 { 0.0 } else { (2.0 - value.abs().log10().floor()).clamp(0.0, 9.0) };
         number(value, decimals as usize)
     };
-    let range = |low: f64, high: f64| format!("{} to {}", significant(low), significant(high));
-    let none = || "–".to_owned();
-    let row = |group: &GroupSummary| {
-        let success = &group.success;
-        let percent = |rate: f64| number(100.0 * rate, 1);
-        let mut cells = vec![
-            if group.name.is_empty() { "all runs".to_owned() } else { group.name.clone() },
-            format!("{} of {}", success.successes, success.runs),
-            format!("{} % ({} to {})", percent(success.rate), percent(success.low), percent(success.high)),
-            group.spread.map_or_else(none, |spread| significant(spread.median)),
-            group.spread.map_or_else(none, |spread| range(spread.q1, spread.q3)),
-        ];
-        if report.reference.is_some() {
-            cells.extend([
-                group.difference.map_or_else(none, |[_, mean, _]| significant(mean)),
-                group.difference.map_or_else(none, |[low, _, high]| range(low, high)),
-                group.pairs.to_string(),
-            ]);
-        }
-        cells
+    let range = move |low: f64, high: f64| format!("{} to {}", significant(low), significant(high));
+    let or_dash = |text: Option<String>| text.unwrap_or_else(|| "–".to_owned());
+    let rate = |group: &GroupSummary| {
+        let [rate, low, high] =
+            [group.success.rate, group.success.low, group.success.high].map(|it| number(100.0 * it, 1));
+        format!("{rate} % ({low} to {high})")
     };
-    let mut header = vec![
-        report.group.clone().unwrap_or_else(|| "runs".to_owned()),
-        "succeeded".to_owned(),
-        "rate (95 %, Wilson)".to_owned(),
-        format!("median {}", report.metric),
-        "quartiles".to_owned(),
+    let mut columns = vec![
+        GroupColumn::page(report.group.as_deref().unwrap_or("runs"), |group| {
+            if group.name.is_empty() { "all runs".to_owned() } else { group.name.clone() }
+        }),
+        GroupColumn::page("succeeded", |group| format!("{} of {}", group.success.successes, group.success.runs)),
+        GroupColumn::page("rate (95 %, Wilson)", rate),
+        GroupColumn::page(format!("median {}", report.metric), move |group| {
+            or_dash(group.spread.map(|spread| significant(spread.median)))
+        }),
+        GroupColumn::page("quartiles", move |group| or_dash(group.spread.map(|spread| range(spread.q1, spread.q3)))),
     ];
     if let Some(reference) = &report.reference {
-        header.extend([format!("mean difference to {reference}"), "95 % interval".to_owned(), "pairs".to_owned()]);
+        columns.extend([
+            GroupColumn::page(format!("mean difference to {reference}"), move |group| {
+                or_dash(group.difference.map(|[_, mean, _]| significant(mean)))
+            }),
+            GroupColumn::page("95 % interval", move |group| {
+                or_dash(group.difference.map(|[low, _, high]| range(low, high)))
+            }),
+            GroupColumn::page("pairs", |group| group.pairs),
+        ]);
     }
-    let rows: Vec<Vec<String>> = report.groups.iter().map(row).collect();
     table(
         "Groups of the study; differences are of runs on the same log, disturbance, perturbation and seed",
-        &header,
-        &rows,
+        &columns,
+        &report.groups,
     )
 }
 
 fn parameters(report: &StudyReport) -> Markup {
-    let header = [
-        "parameter",
-        "unit",
-        "runs",
-        "RMS of error / σ",
-        "mean of error / σ",
-        "within 1 σ",
-        "within 3 σ",
-        "RMS error",
-        "median σ",
-    ];
-    let row = |of: &ParameterErrors| {
-        let percent = |rate: f64| format!("{} %", number(100.0 * rate, 1));
-        vec![
-            of.name.clone(),
-            of.unit.to_owned(),
-            of.points.len().to_string(),
-            number(of.ratio_rms, 2),
-            number(of.ratio_mean, 2),
-            percent(of.within_1),
-            percent(of.within_3),
-            number(of.error_rms, 4),
-            number(of.sigma_median, 4),
-        ]
-    };
-    let rows: Vec<Vec<String>> = report.parameters.iter().map(row).collect();
-    table("Errors against σ; consistent: RMS 1, 68.3 % within 1 σ, 99.7 % within 3 σ", &header, &rows)
+    let caption = "Errors against σ; consistent: RMS 1, 68.3 % within 1 σ, 99.7 % within 3 σ";
+    table(caption, &ParameterErrors::columns(), &report.parameters)
 }

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::numbers::{number, shown_unit};
+use super::numbers::number;
 use crate::calibration::ChainDistance;
 use crate::geometry::{Dimension, seconds_from_ns};
 use crate::log_check::{CheckReport, Severity};
@@ -12,6 +12,7 @@ use crate::session::{
     FlightParameter, LostSince, PoseError, Recording, RunRecord, RunSummary, StepRecord, flight_headline,
     least_determined, run_warning_lines,
 };
+use crate::table::Shown;
 
 /// Largest trajectory error, in percent of the path length, with a good mark.
 const MAX_ATE_PERCENT: f64 = 1.0;
@@ -296,11 +297,10 @@ fn chain_error(error: &ChainDistance) -> String {
 
 /// A standard deviation with two digits and its unit.
 fn sigma_text(dimension: Dimension, sigma: f64) -> String {
-    let (unit, scale, _) = shown_unit(dimension);
-    let shown = sigma * scale;
+    let Shown { factor, unit } = Shown::of(dimension);
+    let shown = sigma * factor;
     let decimals = if shown > 0.0 { (1.0 - shown.log10().floor()).clamp(0.0, 6.0) as usize } else { 0 };
-    let space = if unit.is_empty() || unit == "°" { "" } else { " " };
-    format!("{}{space}{unit}", number(shown, decimals))
+    format!("{}{unit}", number(shown, decimals))
 }
 
 fn count(number: usize, noun: &str) -> String {

@@ -45,10 +45,11 @@ pub use playback::{
     SavedBreakpoint, SavedFork, SavedLog, SavedPrior, SavedSession, SavedSessionError, Session, Wake,
 };
 pub use record::{
-    CollectedInformation, ComparedQuantity, Comparison, Divergence, FlightParameter, FlightVerdicts, ForkOrigin,
-    ImageResiduals, KnownLossSummary, LostSince, MeanResidual, ParameterSummary, PassProgress, PoseConsistency,
-    PoseError, PositionTruth, RELATIVE_LENGTHS_M, Recording, RelativeAccuracy, ResidualSum, RunMemory, RunRecord,
-    RunSummary, RunWarning, SolverPosition, SolverTrace, StageSummary, StepFactorRows, StepRecord, TrajectoryAccuracy,
-    TrajectoryEvaluation, TrajectoryLane, WarningLine, evaluate_trajectory, flight_advice, flight_headline,
-    flight_table, least_determined, log_warning_lines, run_warning_lines, summarize, warning_lines,
+    CalibrationRow, CollectedInformation, ComparedQuantity, Comparison, Divergence, FlightParameter, FlightVerdicts,
+    ForkOrigin, ImageResiduals, KnownLossSummary, LostSince, MeanResidual, ParameterSummary, PassProgress,
+    PoseConsistency, PoseError, PositionTruth, RELATIVE_LENGTHS_M, RankColumn, RankSummary, Recording,
+    RelativeAccuracy, ResidualSum, RunMemory, RunRecord, RunSummary, RunWarning, SolverPosition, SolverTrace,
+    StageSummary, StepColumn, StepFactorRows, StepRecord, TimingSummary, TrajectoryAccuracy, TrajectoryEvaluation,
+    TrajectoryLane, WarningLine, evaluate_trajectory, flight_advice, flight_headline, flight_table, least_determined,
+    log_warning_lines, run_warning_lines, summarize, warning_lines,
 };

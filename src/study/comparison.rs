@@ -12,10 +12,11 @@ use std::fmt;
 use serde::Serialize;
 use thiserror::Error;
 
-use super::columns::{Direction, PAIRING_COLUMNS, run_column};
+use super::columns::{PAIRING_COLUMNS, run_column};
 use super::pairing::{RunPair, pair_runs};
 use super::statistics::MeanInterval;
 use super::table::{StudyTable, TableError};
+use crate::table::Direction;
 
 /// Metric that compares the numbers of runs with a result.
 pub const SUCCESS: &str = "success";
@@ -176,7 +177,7 @@ pub fn compare(
 }
 
 fn check_metric(table: &StudyTable, name: &str) -> Result<(), ComparisonError> {
-    use super::table::ColumnType::{Integer, Number};
+    use crate::table::ColumnType::{Integer, Number};
     let numeric = |column: &&super::table::StudyColumn| {
         matches!(column.values.column_type(), Number | Integer) && !PAIRING_COLUMNS.contains(&column.name.as_str())
     };

@@ -26,8 +26,7 @@ mod tests;
 pub mod view;
 
 pub use columns::{
-    Direction, JobCosts, JobResult, JobStatus, PAIRING_COLUMNS, RunResult, StudyTables, frames_table, parameters_table,
-    runs_table,
+    JobCosts, JobResult, JobStatus, PAIRING_COLUMNS, RunResult, StudyTables, frames_table, parameters_table, runs_table,
 };
 pub use comparison::{
     ComparisonError, MetricComparison, PairedVerdict, SUCCESS, StudyComparison, WorstPair, baseline_table, compare,
@@ -43,4 +42,6 @@ pub use plan::{
 };
 pub use recipe::{EncoderNoise, FlightRecipe};
 pub use statistics::MeanInterval;
-pub use table::{Cell, ColumnType, ColumnValues, StudyColumn, StudyTable, TableError};
+pub use table::{ColumnValues, StudyColumn, StudyTable, TableError};
+
+pub use crate::table::{Cell, ColumnType, Direction};

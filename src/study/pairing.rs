@@ -9,8 +9,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::columns::PAIRING_COLUMNS;
-use super::table::{Cell, StudyTable};
+use super::table::StudyTable;
 use crate::session::RunSpec;
+use crate::table::Cell;
 
 /// Rows of two tables with the same inputs.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -2,206 +2,47 @@
 //!
 //! Every cell may be empty, so that a run that crashed is an ordinary row. Numbers are finite or empty.
 
-use std::cmp::Ordering;
 use std::collections::BTreeMap;
-use std::fmt;
 
 use thiserror::Error;
 
-use crate::files::csv_writer::CsvWriter;
+use crate::table::{Cell, ColumnType, csv_text};
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum ColumnType {
-    /// Floating-point number of 64 bits.
-    Number,
-    /// Signed integer of 64 bits.
-    Integer,
-    Text,
-    Bool,
-}
-
-impl ColumnType {
-    /// Name in messages and documents.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Number => "number",
-            Self::Integer => "integer",
-            Self::Text => "text",
-            Self::Bool => "bool",
-        }
-    }
-}
-
+/// The cells of one column, one per row: each is empty or of its type.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Cell {
-    /// No value, of any type.
-    Empty,
-    /// A number; a non-finite one is stored as [`Cell::Empty`].
-    Number(f64),
-    Integer(i64),
-    Text(String),
-    Bool(bool),
-}
-
-impl Cell {
-    /// `None` for an empty cell.
-    pub fn column_type(&self) -> Option<ColumnType> {
-        match self {
-            Self::Empty => None,
-            Self::Number(_) => Some(ColumnType::Number),
-            Self::Integer(_) => Some(ColumnType::Integer),
-            Self::Text(_) => Some(ColumnType::Text),
-            Self::Bool(_) => Some(ColumnType::Bool),
-        }
-    }
-
-    /// The value as a number; integers are converted, true is 1 and false is 0.
-    pub fn number(&self) -> Option<f64> {
-        match self {
-            Self::Number(number) => Some(*number),
-            Self::Integer(integer) => Some(*integer as f64),
-            Self::Bool(yes) => Some(f64::from(u8::from(*yes))),
-            Self::Empty | Self::Text(_) => None,
-        }
-    }
-
-    /// Order for sorting: by value within a type, false before true; empty cells come last.
-    pub fn order(&self, other: &Self) -> Ordering {
-        match (self, other) {
-            (Self::Text(a), Self::Text(b)) => a.cmp(b),
-            (Self::Integer(a), Self::Integer(b)) => a.cmp(b),
-            _ => match (self.number(), other.number()) {
-                (Some(a), Some(b)) => a.total_cmp(&b),
-                (Some(_), None) => Ordering::Less,
-                (None, Some(_)) => Ordering::Greater,
-                (None, None) => matches!(self, Self::Empty).cmp(&matches!(other, Self::Empty)),
-            },
-        }
-    }
-}
-
-/// The value in machine-readable form, with all digits of a number; empty for an empty cell.
-impl fmt::Display for Cell {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Empty => Ok(()),
-            Self::Number(number) => write!(formatter, "{number}"),
-            Self::Integer(integer) => write!(formatter, "{integer}"),
-            Self::Text(text) => formatter.write_str(text),
-            Self::Bool(yes) => write!(formatter, "{yes}"),
-        }
-    }
-}
-
-impl From<f64> for Cell {
-    fn from(number: f64) -> Self {
-        if number.is_finite() { Self::Number(number) } else { Self::Empty }
-    }
-}
-
-impl From<i64> for Cell {
-    fn from(integer: i64) -> Self {
-        Self::Integer(integer)
-    }
-}
-
-impl From<usize> for Cell {
-    fn from(count: usize) -> Self {
-        i64::try_from(count).map_or(Self::Empty, Self::Integer)
-    }
-}
-
-impl From<bool> for Cell {
-    fn from(yes: bool) -> Self {
-        Self::Bool(yes)
-    }
-}
-
-impl From<&str> for Cell {
-    fn from(text: &str) -> Self {
-        Self::Text(text.to_owned())
-    }
-}
-
-impl From<String> for Cell {
-    fn from(text: String) -> Self {
-        Self::Text(text)
-    }
-}
-
-impl<T: Into<Self>> From<Option<T>> for Cell {
-    fn from(value: Option<T>) -> Self {
-        value.map_or(Self::Empty, Into::into)
-    }
-}
-
-/// The values of one column, one per row; `None` is an empty cell.
-#[derive(Clone, Debug, PartialEq)]
-pub enum ColumnValues {
-    Number(Vec<Option<f64>>),
-    Integer(Vec<Option<i64>>),
-    Text(Vec<Option<String>>),
-    Bool(Vec<Option<bool>>),
+pub struct ColumnValues {
+    column_type: ColumnType,
+    cells: Vec<Cell>,
 }
 
 impl ColumnValues {
     pub fn new(column_type: ColumnType) -> Self {
-        match column_type {
-            ColumnType::Number => Self::Number(Vec::new()),
-            ColumnType::Integer => Self::Integer(Vec::new()),
-            ColumnType::Text => Self::Text(Vec::new()),
-            ColumnType::Bool => Self::Bool(Vec::new()),
-        }
+        Self { column_type, cells: Vec::new() }
     }
 
     pub fn column_type(&self) -> ColumnType {
-        match self {
-            Self::Number(_) => ColumnType::Number,
-            Self::Integer(_) => ColumnType::Integer,
-            Self::Text(_) => ColumnType::Text,
-            Self::Bool(_) => ColumnType::Bool,
-        }
+        self.column_type
     }
 
-    pub fn len(&self) -> usize {
-        match self {
-            Self::Number(values) => values.len(),
-            Self::Integer(values) => values.len(),
-            Self::Text(values) => values.len(),
-            Self::Bool(values) => values.len(),
-        }
-    }
-
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
+    pub fn cells(&self) -> &[Cell] {
+        &self.cells
     }
 
     /// The cell of a row; empty beyond the end.
     pub fn cell(&self, row: usize) -> Cell {
-        match self {
-            Self::Number(values) => values.get(row).copied().flatten().into(),
-            Self::Integer(values) => values.get(row).copied().flatten().into(),
-            Self::Text(values) => values.get(row).and_then(Option::as_deref).into(),
-            Self::Bool(values) => values.get(row).copied().flatten().into(),
-        }
+        self.cells.get(row).cloned().unwrap_or(Cell::Empty)
     }
 
     /// Appends a cell; returns `false` and leaves the column unchanged if the type differs.
-    fn push(&mut self, cell: Cell) -> bool {
-        match (self, cell) {
-            (Self::Number(values), Cell::Number(number)) => values.push(Some(number).filter(|it| it.is_finite())),
-            // Some programs write 1 for 1.0.
-            (Self::Number(values), Cell::Integer(integer)) => values.push(Some(integer as f64)),
-            (Self::Number(values), Cell::Empty) => values.push(None),
-            (Self::Integer(values), Cell::Integer(integer)) => values.push(Some(integer)),
-            (Self::Integer(values), Cell::Empty) => values.push(None),
-            (Self::Text(values), Cell::Text(text)) => values.push(Some(text)),
-            (Self::Text(values), Cell::Empty) => values.push(None),
-            (Self::Bool(values), Cell::Bool(yes)) => values.push(Some(yes)),
-            (Self::Bool(values), Cell::Empty) => values.push(None),
-            _ => return false,
+    pub fn push(&mut self, cell: Cell) -> bool {
+        // Some programs write 1 for 1.0.
+        let is_number = self.column_type == ColumnType::Number && !matches!(cell, Cell::Text(_) | Cell::Bool(_));
+        let cell = if is_number { cell.number().into() } else { cell };
+        let fits = cell.column_type().is_none_or(|found| found == self.column_type);
+        if fits {
+            self.cells.push(cell);
         }
-        true
+        fits
     }
 }
 
@@ -262,10 +103,10 @@ impl StudyTable {
     /// # Errors
     /// If two columns have the same name, or columns have different lengths.
     pub fn new(columns: Vec<StudyColumn>) -> Result<Self, TableError> {
-        let rows = columns.first().map_or(0, |column| column.values.len());
+        let rows = columns.first().map_or(0, |column| column.values.cells.len());
         let mut places = BTreeMap::new();
         for (place, column) in columns.iter().enumerate() {
-            let (name, found) = (column.name.clone(), column.values.len());
+            let (name, found) = (column.name.clone(), column.values.cells.len());
             if found != rows {
                 return Err(TableError::UnequalLength { name, found, expected: rows });
             }
@@ -302,38 +143,29 @@ impl StudyTable {
         self.column(column).map_or(Cell::Empty, |column| column.values.cell(row))
     }
 
+    /// The cell of a row, `None` if there is no such row or column.
+    fn known(&self, row: usize, column: &str) -> Option<&Cell> {
+        self.column(column)?.values.cells.get(row)
+    }
+
     /// A cell as a number, as in [`Cell::number`].
     pub fn number(&self, row: usize, column: &str) -> Option<f64> {
-        match &self.column(column)?.values {
-            ColumnValues::Number(values) => values.get(row).copied().flatten(),
-            ColumnValues::Integer(values) => values.get(row).copied().flatten().map(|value| value as f64),
-            ColumnValues::Bool(values) => values.get(row).copied().flatten().map(|yes| f64::from(u8::from(yes))),
-            ColumnValues::Text(_) => None,
-        }
+        self.known(row, column)?.number()
     }
 
     /// A cell of a text column, `None` if it is empty or the column has another type.
     pub fn text(&self, row: usize, column: &str) -> Option<&str> {
-        match &self.column(column)?.values {
-            ColumnValues::Text(values) => values.get(row)?.as_deref(),
-            _ => None,
-        }
+        if let Cell::Text(text) = self.known(row, column)? { Some(text) } else { None }
     }
 
     /// A cell of an integer column, `None` if it is empty or the column has another type.
     pub fn integer(&self, row: usize, column: &str) -> Option<i64> {
-        match &self.column(column)?.values {
-            ColumnValues::Integer(values) => values.get(row).copied().flatten(),
-            _ => None,
-        }
+        if let Cell::Integer(integer) = self.known(row, column)? { Some(*integer) } else { None }
     }
 
     /// A cell of a Boolean column, `None` if it is empty or the column has another type.
     pub fn boolean(&self, row: usize, column: &str) -> Option<bool> {
-        match &self.column(column)?.values {
-            ColumnValues::Bool(values) => values.get(row).copied().flatten(),
-            _ => None,
-        }
+        if let Cell::Bool(yes) = self.known(row, column)? { Some(*yes) } else { None }
     }
 
     /// The cells of a row in the order of the columns.
@@ -343,11 +175,8 @@ impl StudyTable {
 
     /// Rows of these numbers as comma-separated values under the names of the columns.
     pub fn csv(&self, rows: impl IntoIterator<Item = usize>) -> String {
-        let mut csv = CsvWriter::new(self.columns.iter().map(|column| column.name.as_str()));
-        for row in rows {
-            csv.row(self.row(row).map(|cell| cell.to_string()));
-        }
-        csv.into_text()
+        let cells = |row: usize| self.row(row).map(|cell| cell.to_string());
+        csv_text(self.columns.iter().map(|column| &column.name), rows.into_iter().map(cells))
     }
 
     /// Appends a row of named cells; columns that are not named get an empty cell.

@@ -22,7 +22,7 @@ use serde::{Deserialize, Serialize};
 use super::error::StudyFileError;
 use crate::files::output;
 use crate::files::output::{OutputFile, StagedFile};
-use crate::study::{ColumnType, ColumnValues, StudyColumn, StudyTable};
+use crate::study::{Cell, ColumnType, ColumnValues, StudyColumn, StudyTable};
 
 /// Key of the metadata with units and descriptions.
 const COLUMNS_KEY: &str = "dcvins.columns";
@@ -97,21 +97,24 @@ fn write(table: &StudyTable, file: OutputFile) -> ParquetResult<OutputFile> {
         let Some(mut column_writer) = group.next_column()? else {
             return Err(ParquetError::General(format!("no place for the column '{}'", column.name)));
         };
-        match (&column.values, column_writer.untyped()) {
-            (ColumnValues::Number(cells), ColumnWriter::DoubleColumnWriter(writer)) => {
-                let (values, levels) = split(cells, |value| *value);
+        let cells = column.values.cells();
+        let levels: Vec<i16> = cells.iter().map(|cell| i16::from(*cell != Cell::Empty)).collect();
+        match column_writer.untyped() {
+            ColumnWriter::DoubleColumnWriter(writer) => {
+                let values: Vec<f64> = cells.iter().filter_map(Cell::number).collect();
                 writer.write_batch(&values, Some(&levels), None)?;
             }
-            (ColumnValues::Integer(cells), ColumnWriter::Int64ColumnWriter(writer)) => {
-                let (values, levels) = split(cells, |value| *value);
-                writer.write_batch(&values, Some(&levels), None)?;
+            ColumnWriter::Int64ColumnWriter(writer) => {
+                let of = |cell: &Cell| if let Cell::Integer(integer) = cell { Some(*integer) } else { None };
+                writer.write_batch(&cells.iter().filter_map(of).collect::<Vec<_>>(), Some(&levels), None)?;
             }
-            (ColumnValues::Bool(cells), ColumnWriter::BoolColumnWriter(writer)) => {
-                let (values, levels) = split(cells, |value| *value);
-                writer.write_batch(&values, Some(&levels), None)?;
+            ColumnWriter::BoolColumnWriter(writer) => {
+                let of = |cell: &Cell| if let Cell::Bool(yes) = cell { Some(*yes) } else { None };
+                writer.write_batch(&cells.iter().filter_map(of).collect::<Vec<_>>(), Some(&levels), None)?;
             }
-            (ColumnValues::Text(cells), ColumnWriter::ByteArrayColumnWriter(writer)) => {
-                let (values, levels) = split(cells, |text| ByteArray::from(text.as_str()));
+            ColumnWriter::ByteArrayColumnWriter(writer) => {
+                let of = |cell: &Cell| if let Cell::Text(text) = cell { Some(text.as_str().into()) } else { None };
+                let values: Vec<ByteArray> = cells.iter().filter_map(of).collect();
                 writer.write_batch(&values, Some(&levels), None)?;
             }
             _ => return Err(ParquetError::General(format!("another type of column '{}'", column.name))),
@@ -120,12 +123,6 @@ fn write(table: &StudyTable, file: OutputFile) -> ParquetResult<OutputFile> {
     }
     group.close()?;
     writer.into_inner()
-}
-
-/// The non-empty cells, and the definition level of every cell: 1 for a value, 0 for an empty cell.
-fn split<T, V>(cells: &[Option<T>], value: impl Fn(&T) -> V) -> (Vec<V>, Vec<i16>) {
-    let levels = cells.iter().map(|cell| i16::from(cell.is_some())).collect();
-    (cells.iter().flatten().map(value).collect(), levels)
 }
 
 /// Reads a table of this program, or of another one with flat columns of numbers, integers, texts and Booleans.
@@ -179,37 +176,29 @@ fn read(file: std::fs::File) -> ParquetResult<StudyTable> {
 
 /// Appends the cells of one row group.
 fn read_column(reader: ColumnReader, rows: usize, optional: bool, values: &mut ColumnValues) -> ParquetResult<()> {
-    match (reader, values) {
-        (ColumnReader::DoubleColumnReader(reader), ColumnValues::Number(cells)) => {
-            read_cells(reader, rows, optional, cells, |value: f64| Ok(Some(value).filter(|it| it.is_finite())))
+    match reader {
+        ColumnReader::DoubleColumnReader(reader) => read_cells(reader, rows, optional, values, |it: f64| Ok(it.into())),
+        ColumnReader::FloatColumnReader(reader) => {
+            read_cells(reader, rows, optional, values, |it: f32| Ok(f64::from(it).into()))
         }
-        (ColumnReader::FloatColumnReader(reader), ColumnValues::Number(cells)) => {
-            read_cells(reader, rows, optional, cells, |value: f32| {
-                Ok(Some(f64::from(value)).filter(|it| it.is_finite()))
-            })
+        ColumnReader::Int64ColumnReader(reader) => read_cells(reader, rows, optional, values, |it: i64| Ok(it.into())),
+        ColumnReader::Int32ColumnReader(reader) => {
+            read_cells(reader, rows, optional, values, |it: i32| Ok(i64::from(it).into()))
         }
-        (ColumnReader::Int64ColumnReader(reader), ColumnValues::Integer(cells)) => {
-            read_cells(reader, rows, optional, cells, |value: i64| Ok(Some(value)))
-        }
-        (ColumnReader::Int32ColumnReader(reader), ColumnValues::Integer(cells)) => {
-            read_cells(reader, rows, optional, cells, |value: i32| Ok(Some(i64::from(value))))
-        }
-        (ColumnReader::BoolColumnReader(reader), ColumnValues::Bool(cells)) => {
-            read_cells(reader, rows, optional, cells, |value: bool| Ok(Some(value)))
-        }
-        (ColumnReader::ByteArrayColumnReader(reader), ColumnValues::Text(cells)) => {
-            read_cells(reader, rows, optional, cells, |value: ByteArray| Ok(Some(value.as_utf8()?.to_owned())))
+        ColumnReader::BoolColumnReader(reader) => read_cells(reader, rows, optional, values, |it: bool| Ok(it.into())),
+        ColumnReader::ByteArrayColumnReader(reader) => {
+            read_cells(reader, rows, optional, values, |it: ByteArray| Ok(it.as_utf8()?.into()))
         }
         _ => Err(ParquetError::General("a column of another type than its description".to_owned())),
     }
 }
 
-fn read_cells<T: DataType, V>(
+fn read_cells<T: DataType>(
     mut reader: ColumnReaderImpl<T>,
     rows: usize,
     optional: bool,
-    cells: &mut Vec<Option<V>>,
-    convert: impl Fn(T::T) -> ParquetResult<Option<V>>,
+    cells: &mut ColumnValues,
+    convert: impl Fn(T::T) -> ParquetResult<Cell>,
 ) -> ParquetResult<()> {
     let mut left = rows;
     while left > 0 {
@@ -224,7 +213,7 @@ fn read_cells<T: DataType, V>(
         for record in 0..records {
             let present = !optional || levels.get(record).is_some_and(|level| *level > 0);
             let value = if present { values.next() } else { None };
-            cells.push(value.map_or(Ok(None), &convert)?);
+            cells.push(value.map_or(Ok(Cell::Empty), &convert)?);
         }
         left -= records;
     }

@@ -236,15 +236,9 @@ fn cell_of(kind: ColumnType, text: &str) -> Cell {
 }
 
 fn values_of(kind: ColumnType, texts: &[String]) -> ColumnValues {
-    match kind {
-        ColumnType::Number => ColumnValues::Number(texts.iter().map(|text| cell_of(kind, text).number()).collect()),
-        ColumnType::Integer => ColumnValues::Integer(texts.iter().map(|text| text.parse().ok()).collect()),
-        ColumnType::Bool => {
-            let value = |text: &String| cell_of(kind, text).number().map(|number| number > 0.0);
-            ColumnValues::Bool(texts.iter().map(value).collect())
-        }
-        ColumnType::Text => {
-            ColumnValues::Text(texts.iter().map(|text| Some(text.clone()).filter(|text| !text.is_empty())).collect())
-        }
+    let mut values = ColumnValues::new(kind);
+    for text in texts {
+        values.push(cell_of(kind, text));
     }
+    values
 }

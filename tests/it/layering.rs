@@ -3,9 +3,10 @@
 use super::imports::{Imports, is_test_file, source_files};
 
 /// Folders from the first to the last; each may use those before it. The table in `src/lib.rs` says what each promises.
-const ORDER: [&str; 25] = [
+const ORDER: [&str; 26] = [
     "text",
     "geometry",
+    "table",
     "camera",
     "gimbal",
     "sensors",

@@ -84,6 +84,16 @@ impl CalibrationEstimate {
     pub fn index_of(&self, parameter: ParameterId) -> Option<usize> {
         self.parameters.iter().position(|known| *known == parameter)
     }
+
+    /// Estimate of a parameter.
+    pub fn value_of(&self, parameter: ParameterId) -> Option<f64> {
+        self.values.get(self.index_of(parameter)?).copied()
+    }
+
+    /// Posterior standard deviation of a parameter.
+    pub fn sigma_of(&self, parameter: ParameterId) -> Option<f64> {
+        self.sigmas.get(self.index_of(parameter)?).copied()
+    }
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -99,6 +109,30 @@ pub struct StageTimes {
     pub marginalize_ms: f64,
     pub observability_ms: f64,
     pub step_ms: f64,
+}
+
+/// Stage of a step whose time is measured.
+pub struct Stage {
+    pub key: &'static str,
+    pub meaning: &'static str,
+    pub time_ms: fn(&StageTimes) -> f64,
+}
+
+impl StageTimes {
+    /// Stages in their order, and the whole step.
+    pub const STAGES: [Stage; 7] = [
+        Stage { key: "frontend", meaning: "feature tracking", time_ms: |times| times.frontend_ms },
+        Stage { key: "optimize", meaning: "nonlinear solve", time_ms: |times| times.optimize_ms },
+        Stage {
+            key: "linearize",
+            meaning: "linearization for the observability analysis",
+            time_ms: |times| times.linearize_ms,
+        },
+        Stage { key: "report", meaning: "building the report", time_ms: |times| times.report_ms },
+        Stage { key: "marginalize", meaning: "marginalization", time_ms: |times| times.marginalize_ms },
+        Stage { key: "observability", meaning: "observability analysis", time_ms: |times| times.observability_ms },
+        Stage { key: "step", meaning: "whole step", time_ms: |times| times.step_ms },
+    ];
 }
 
 /// Result of one step of the estimator.

@@ -43,7 +43,7 @@ pub(super) fn stage_results(recording: &Recording, run: &RunRecord, path: &Path)
     results.log.finish_staged()
 }
 
-struct Results {
+struct Results<'a> {
     log: LogWriter,
     names: Names,
     /// Alignment of the run's world with the ground truth's.
@@ -52,12 +52,12 @@ struct Results {
     trajectory: Vec<(i64, RigidTransform)>,
     /// Stamp of the next path message.
     path_due_ns: i64,
-    series: Series,
+    series: Series<'a>,
     epoch_ns: i64,
 }
 
-impl Results {
-    fn write_step(&mut self, step: &StepRecord, last: bool) -> Result<(), LogError> {
+impl<'a> Results<'a> {
+    fn write_step(&mut self, step: &'a StepRecord, last: bool) -> Result<(), LogError> {
         let report = &step.report;
         let times =
             MessageTimes { stamp_ns: self.epoch_ns + report.stamp_ns, log_time_ns: self.epoch_ns + step.log_time_ns };

@@ -1,30 +1,61 @@
 //! Named numbers of a run over time: calibration with σ, joint angles, rank, frame statistics.
 
 use crate::flight_log::{LogError, LogWriter, MessageTimes};
-use crate::gimbal::ParameterId;
 use crate::sensors::Rig;
-use crate::session::{RunRecord, StepRecord};
+use crate::session::{RankColumn, RunRecord, StepColumn, StepRecord};
+use crate::table::Column;
+
+/// Numbers of the frames and of the ranks that become series.
+const FRAME: [&str; 9] = [
+    "tracked",
+    "new",
+    "lost",
+    "rejected",
+    "inliers",
+    "keyframe",
+    "reprojection_rms_before_px",
+    "reprojection_rms_after_px",
+    "iterations",
+];
+const RANK: [&str; 9] = [
+    "columns",
+    "rank_structural",
+    "rank_informed",
+    "deficit_parameterization",
+    "deficit_joints",
+    "deficit_absorbed",
+    "deficit_motion",
+    "structural_threshold",
+    "informed_threshold",
+];
 
 /// Columns of all rows.
-pub(super) struct Series {
-    /// Parameters of all parameterizations of the run, with the names of their two fields.
-    parameters: Vec<(ParameterId, String, String)>,
+pub(super) struct Series<'a> {
+    /// Parameters of all parameterizations of the run, each with its σ.
+    parameters: Vec<StepColumn<'a>>,
+    frame: Vec<StepColumn<'a>>,
+    rank: Vec<RankColumn<'a>>,
     joints: Vec<String>,
 }
 
-impl Series {
+impl<'a> Series<'a> {
     pub(super) fn new(run: &RunRecord, rig: &Rig) -> Self {
-        let names = rig.parameter_names();
-        let mut parameters: Vec<(ParameterId, String, String)> = Vec::new();
-        for calibration in run.steps.iter().map(|step| &step.report.calibration) {
-            for parameter in &calibration.parameters {
-                if !parameters.iter().any(|(known, _, _)| known == parameter) {
-                    let (name, unit) = (names.name(*parameter), parameter.dimension().unit());
-                    parameters.push((*parameter, format!("{name}_{unit}"), format!("{name}_sigma_{unit}")));
-                }
-            }
+        let mut frame = StepRecord::frame_columns(false);
+        frame.retain(|column| FRAME.contains(&&*column.name));
+        let mut rank = StepRecord::rank_columns();
+        rank.retain(|column| RANK.contains(&&*column.name));
+        let ends = [
+            RankColumn::new("largest_singular_value", |(_, rank)| rank.singular_values.first().copied()),
+            RankColumn::new("smallest_singular_value", |(_, rank)| rank.singular_values.last().copied()),
+        ];
+        // Before the thresholds.
+        rank.splice(RANK.len() - 2..RANK.len() - 2, ends);
+        Self {
+            parameters: run.parameter_columns(rig).flat_map(|(_, columns)| columns).collect(),
+            frame,
+            rank,
+            joints: rig.joint_names(),
         }
-        Self { parameters, joints: rig.joint_names() }
     }
 
     pub(super) fn write(
@@ -32,21 +63,15 @@ impl Series {
         log: &mut LogWriter,
         names: &Names,
         times: MessageTimes,
-        step: &StepRecord,
+        step: &'a StepRecord,
     ) -> Result<(), LogError> {
-        Self::write_frame(log, names, times, step)?;
-        Self::write_rank(log, names, times, step)?;
-        let Some(newest) = step.report.newest() else { return Ok(()) };
-        let calibration = &step.report.calibration;
-        let mut row: Vec<(&str, f64)> = Vec::new();
-        for (parameter, value_field, sigma_field) in &self.parameters {
-            // Parameters of another parameterization have no value in this step.
-            let index = calibration.parameters.iter().position(|known| known == parameter);
-            let of = |series: &[f64]| index.and_then(|index| series.get(index)).copied().unwrap_or(f64::NAN);
-            row.push((value_field, of(&calibration.values)));
-            row.push((sigma_field, of(&calibration.sigmas)));
+        log.write_row(&names.topic("frame"), "dcvins_msgs/msg/Frame", times, &row(&self.frame, step))?;
+        if let Some(rank) = &step.rank {
+            log.write_row(&names.topic("rank"), "dcvins_msgs/msg/Rank", times, &row(&self.rank, &(step, rank)))?;
         }
-        log.write_row(&names.topic("calibration"), "dcvins_msgs/msg/Calibration", times, &row)?;
+        let Some(newest) = step.report.newest() else { return Ok(()) };
+        let calibration = row(&self.parameters, step);
+        log.write_row(&names.topic("calibration"), "dcvins_msgs/msg/Calibration", times, &calibration)?;
         if !newest.joint_angles_rad.is_empty() && newest.joint_angles_rad.len() == self.joints.len() {
             log.write_joints(&names.topic("joints"), times, &self.joints, &newest.joint_angles_rad)?;
         }
@@ -61,41 +86,11 @@ impl Series {
         ];
         log.write_row(&names.topic("biases"), "dcvins_msgs/msg/Biases", times, &biases)
     }
+}
 
-    fn write_frame(log: &mut LogWriter, names: &Names, times: MessageTimes, step: &StepRecord) -> Result<(), LogError> {
-        let (report, statistics) = (&step.report, &step.tracks.statistics);
-        let inliers = report.features.iter().filter(|feature| !feature.rejected).count();
-        let row = [
-            ("tracked", statistics.tracked as f64),
-            ("new", statistics.detected as f64),
-            ("lost", statistics.lost as f64),
-            ("rejected", statistics.rejected as f64),
-            ("inliers", inliers as f64),
-            ("keyframe", f64::from(u8::from(report.keyframe))),
-            ("reprojection_rms_before_px", report.reprojection_rms_before_px),
-            ("reprojection_rms_after_px", report.reprojection_rms_after_px),
-            ("iterations", report.iterations.len() as f64),
-        ];
-        log.write_row(&names.topic("frame"), "dcvins_msgs/msg/Frame", times, &row)
-    }
-
-    fn write_rank(log: &mut LogWriter, names: &Names, times: MessageTimes, step: &StepRecord) -> Result<(), LogError> {
-        let Some(rank) = &step.rank else { return Ok(()) };
-        let row = [
-            ("columns", rank.parameters.len() as f64),
-            ("rank_structural", rank.rank_structural as f64),
-            ("rank_informed", rank.rank_informed as f64),
-            ("deficit_parameterization", rank.deficit_parameterization as f64),
-            ("deficit_joints", rank.deficit_joints as f64),
-            ("deficit_absorbed", rank.deficit_absorbed as f64),
-            ("deficit_motion", rank.deficit_motion as f64),
-            ("largest_singular_value", rank.singular_values.first().copied().unwrap_or(f64::NAN)),
-            ("smallest_singular_value", rank.singular_values.last().copied().unwrap_or(f64::NAN)),
-            ("structural_threshold", rank.structural_threshold),
-            ("informed_threshold", rank.informed_threshold),
-        ];
-        log.write_row(&names.topic("rank"), "dcvins_msgs/msg/Rank", times, &row)
-    }
+/// Numbers of a row by the names of their columns; NaN for a parameter of another parameterization.
+fn row<'n, Row>(columns: &'n [Column<'_, Row>], row: &Row) -> Vec<(&'n str, f64)> {
+    columns.iter().map(|column| (&*column.name, column.cell(row).number().unwrap_or(f64::NAN))).collect()
 }
 
 /// Prefix of the topics and frames of one run.

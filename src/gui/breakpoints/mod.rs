@@ -1,13 +1,12 @@
 //! Breakpoints panel: conditions on the steps, their hit counts, and buttons to go to the next hit.
 
-mod csv;
-
 use egui::{Button, CollapsingHeader, Grid, Key, RichText, ScrollArea, TextEdit, Ui, WidgetInfo};
 
 use super::units::counted;
-use super::{Panel, PanelContext};
+use super::{CsvTable, Panel, PanelContext};
 use crate::session::breakpoints::{Breakpoint, Condition, quantity_help};
-use crate::session::{Command, Recording};
+use crate::session::{Command, Recording, RunRecord};
+use crate::table::{Column, Stamp, csv};
 use crate::text::nearest_name;
 
 #[derive(Debug, Default)]
@@ -15,6 +14,23 @@ pub struct BreakpointsPanel {
     typed: String,
     /// Index of the breakpoint whose condition is being edited.
     changing: Option<usize>,
+}
+
+impl CsvTable for BreakpointsPanel {
+    /// Every hit of every breakpoint, by breakpoint and run.
+    fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {
+        type HitColumn<'a> = Column<'a, (&'a Breakpoint, &'a RunRecord, i64)>;
+        let columns = [
+            HitColumn::new("condition", |(breakpoint, ..)| breakpoint.condition.text().to_owned()),
+            HitColumn::new("enabled", |(breakpoint, ..)| breakpoint.enabled),
+            HitColumn::new("run", |(_, run, _)| run.spec.label.as_str()),
+            HitColumn::new("t_s", |(.., stamp_ns)| Stamp(*stamp_ns)),
+        ];
+        let (breakpoints, runs) = (ctx.playback.breakpoints.list(), &ctx.recording.runs);
+        let pairs = breakpoints.iter().flat_map(|breakpoint| runs.iter().map(move |run| (breakpoint, run)));
+        let hits = pairs.flat_map(|(breakpoint, run)| breakpoint.hits_ns(run).map(move |at| (breakpoint, run, at)));
+        csv(&columns, hits)
+    }
 }
 
 impl Panel for BreakpointsPanel {

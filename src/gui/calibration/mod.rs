@@ -1,27 +1,49 @@
 //! Calibration panel: the verdict of the whole flight on every calibration parameter, with reason and remedy.
 
-mod csv;
-mod order;
-mod table;
 #[cfg(test)]
 mod tests;
 
-use egui::{RichText, TextEdit, Ui};
+use egui::{RichText, ScrollArea, TextEdit, Ui};
 
-use self::order::Order;
 use super::derived::flight::FlightReport;
+use super::parameter_names::{meaning_of, place_of};
+use super::table::{TableOrder, TableRow, TableUi};
 use super::widgets::empty_ui;
-use super::{Panel, PanelContext};
+use super::{CsvTable, Panel, PanelContext};
 use crate::geometry::seconds_from_ns;
 use crate::gui::units::fixed;
 use crate::observability::Determination;
-use crate::session::{FlightParameter, Recording, RunRecord, flight_headline};
+use crate::session::{CalibrationRow, Command, FlightParameter, Recording, RunRecord, flight_headline, flight_table};
+use crate::table::csv;
+
+/// Gap between two columns in points.
+const GAP: f32 = 12.0;
+const HEADING_HEIGHT: f32 = 18.0;
+/// Width of the scroll bar in points.
+const SCROLL_BAR: f32 = 10.0;
 
 /// State of the calibration panel: filter and order of the rows.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct CalibrationPanel {
     filter: String,
-    order: Order,
+    order: TableOrder,
+}
+
+impl Default for CalibrationPanel {
+    /// At first the worst verdict is on top.
+    fn default() -> Self {
+        Self { filter: String::new(), order: TableOrder::descending("Verdict") }
+    }
+}
+
+impl CsvTable for CalibrationPanel {
+    /// Verdict of the whole flight on each parameter of the shown run, in the order of `summary.json`.
+    fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {
+        let Some(run) = ctx.selected_run() else { return String::new() };
+        let rows = flight_table(ctx.recording, run);
+        let rows = rows.iter().map(|flight| CalibrationRow { flight, summary: None, waits_for_advice: false });
+        csv(&CalibrationRow::columns(), rows)
+    }
 }
 
 impl Panel for CalibrationPanel {
@@ -40,8 +62,7 @@ impl Panel for CalibrationPanel {
             return;
         }
         self.bar_ui(ui, ctx, number, run, &report);
-        let rows = self.shown(&report.rows);
-        table::ui(ui, ctx, &mut self.order, &rows, report.waits_for_advice);
+        self.table_ui(ui, ctx, &report);
     }
 
     fn view_copy(&self) -> Self {
@@ -71,17 +92,34 @@ impl CalibrationPanel {
         });
     }
 
-    /// Rows that contain the text of the filter, in the chosen order.
-    fn shown<'a>(&self, rows: &'a [FlightParameter]) -> Vec<&'a FlightParameter> {
+    /// Draws the rows that contain the text of the filter; a click goes to the start of a verdict.
+    fn table_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>, report: &FlightReport) {
         let wanted = self.filter.trim().to_lowercase();
         let contains = |row: &&FlightParameter| {
             let texts =
                 [row.name.clone(), row.group.to_owned(), row.verdict_text(), row.reason.clone(), row.remedy.clone()];
             wanted.is_empty() || texts.iter().any(|text| text.to_lowercase().contains(&wanted))
         };
-        let mut shown: Vec<&FlightParameter> = rows.iter().filter(contains).collect();
-        self.order.sort(&mut shown);
-        shown
+        let row = |flight| CalibrationRow { flight, summary: None, waits_for_advice: report.waits_for_advice };
+        let mut rows: Vec<CalibrationRow<'_>> = report.rows.iter().filter(contains).map(row).collect();
+        rows.sort_by_key(|row| place_of(row.flight.parameter));
+        let columns = CalibrationRow::columns();
+        self.order.sort(&columns, &mut rows);
+        let table = TableUi::new(ui, &columns, &rows, GAP, ui.available_width() - SCROLL_BAR);
+        table.headings_ui(ui, ctx, HEADING_HEIGHT, Some(&mut self.order));
+        if rows.is_empty() {
+            ui.label(RichText::new("No parameter contains this text").color(ctx.theme.text_weak));
+        }
+        let recording = ctx.recording;
+        let properties = |row: &CalibrationRow<'_>| TableRow {
+            parameter: Some(row.flight.parameter),
+            sentence: row.flight.sentence(),
+            hint: format!("{}: {}", row.flight.name, meaning_of(row.flight.parameter, &recording.rig)),
+        };
+        let rows = ScrollArea::vertical().auto_shrink(false);
+        let clicked = rows.show(ui, |ui| table.rows_ui(ui, ctx, properties, |_, _, _| {})).inner;
+        let since_ns = clicked.and_then(|row| row.flight.since_ns);
+        ctx.commands.extend(since_ns.map(|stamp_ns| Command::Seek { stamp_ns }));
     }
 }
 

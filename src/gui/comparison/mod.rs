@@ -137,13 +137,7 @@ impl Panel for ComparisonPanel {
 }
 
 impl ComparisonPanel {
-    /// Comparisons of all runs, then of all trajectories, with the reference run; that of the reference itself is
-    /// empty.
-    pub(in crate::gui) fn comparisons(&mut self, ctx: &PanelContext<'_>) -> &[Comparison] {
-        self.read(ctx);
-        &self.comparisons
-    }
-
+    /// Compares all runs, then all trajectories, with the reference run; the comparison of the reference itself is empty.
     fn read(&mut self, ctx: &PanelContext<'_>) {
         let (runs, trajectories) = (&ctx.recording.runs, &ctx.recording.trajectories);
         self.reference = self.reference.min(runs.len().saturating_sub(1));

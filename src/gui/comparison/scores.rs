@@ -132,87 +132,76 @@ impl Scores {
     }
 
     pub(crate) fn rows(&self) -> Vec<ScoreRow> {
-        let row = |name: &str, unit: &'static str, less, decimals, of: &dyn Fn(&RunScore) -> Option<f64>| ScoreRow {
+        const ATE: &str = "Absolute trajectory error: distance to the ground truth after alignment in yaw and position, over the estimated frames";
+        const RPE: &str = "Relative pose error against the ground truth over sub-trajectories of this path length";
+        const EXTRINSICS: &str =
+            "Error of imu_from_camera against the ground-truth rig, mean over the visited joint angles";
+        let row = |name: &str, unit, kind, meaning, decimals, of: &dyn Fn(&RunScore) -> Option<f64>| ScoreRow {
             name: name.to_owned(),
-            meaning: "",
+            meaning,
             unit,
             values: self.runs.iter().map(of).collect(),
-            kind: ScoreKind::Exact,
+            kind,
             scatters: Vec::new(),
-            less_is_better: less,
+            less_is_better: Some(true),
             decimals,
         };
-        let with = |meaning: &'static str, row: ScoreRow| ScoreRow { meaning, ..row };
-        let less = Some(true);
-        let ate = |row| {
-            let row = with(
-                "Absolute trajectory error: distance to the ground truth after alignment in yaw and position, over the estimated frames",
-                row,
-            );
-            ScoreRow { kind: ScoreKind::Absolute, ..row }
+        let ate = |name: &str, of: fn(&TrajectoryAccuracy) -> f64| {
+            row(name, "m", ScoreKind::Absolute, ATE, None, &|score| score.accuracy.as_ref().map(of))
+        };
+        let count = |name: &str, meaning: &'static str, of: fn(&RunScore) -> Option<usize>| {
+            let row = row(name, "", ScoreKind::Exact, meaning, Some(0), &|score| of(score).map(|count| count as f64));
+            ScoreRow { less_is_better: None, ..row }
         };
         let mut rows = vec![
-            ate(row("ATE RMS", "m", less, None, &|score| Some(score.accuracy.as_ref()?.ate_rmse_m))),
-            ate(row("ATE mean", "m", less, None, &|score| Some(score.accuracy.as_ref()?.ate_mean_m))),
-            ate(row("ATE median", "m", less, None, &|score| Some(score.accuracy.as_ref()?.ate_median_m))),
-            ate(row("ATE max", "m", less, None, &|score| Some(score.accuracy.as_ref()?.ate_max_m))),
-            ate(row("ATE RMS / path length", "%", less, Some(2), &|score| {
+            ate("ATE RMS", |accuracy| accuracy.ate_rmse_m),
+            ate("ATE mean", |accuracy| accuracy.ate_mean_m),
+            ate("ATE median", |accuracy| accuracy.ate_median_m),
+            ate("ATE max", |accuracy| accuracy.ate_max_m),
+            row("ATE RMS / path length", "%", ScoreKind::Absolute, ATE, Some(2), &|score| {
                 let accuracy = score.accuracy.as_ref().filter(|accuracy| accuracy.length_m > 0.0)?;
                 Some(accuracy.ate_percent_of_length)
-            })),
+            }),
         ];
-        let rpe = |delta_m: f64, row| {
-            let meaning = "Relative pose error against the ground truth over sub-trajectories of this path length";
-            ScoreRow { kind: ScoreKind::Relative(delta_m), ..with(meaning, row) }
-        };
-        let extrinsics = |row| {
-            let meaning = "Error of imu_from_camera against the ground-truth rig, mean over the visited joint angles";
-            ScoreRow { kind: ScoreKind::Extrinsics, ..with(meaning, row) }
-        };
         for delta_m in RELATIVE_LENGTHS_M {
-            let over =
-                |score: &RunScore| score.accuracy.as_ref()?.rpe.iter().find(|over| over.delta_m == delta_m).copied();
-            let name = format!("RPE {delta_m:.0} m RMS");
-            rows.push(rpe(delta_m, row(&name, "m", less, None, &|score| Some(over(score)?.translation_rmse_m))));
-            rows.push(rpe(delta_m, row(&name, "°", less, None, &|score| Some(over(score)?.rotation_rmse_deg))));
+            let over = |score: &RunScore| score.accuracy.as_ref()?.rpe.iter().find(|it| it.delta_m == delta_m).copied();
+            let (name, kind) = (format!("RPE {delta_m:.0} m RMS"), ScoreKind::Relative(delta_m));
+            rows.push(row(&name, "m", kind, RPE, None, &|score| Some(over(score)?.translation_rmse_m)));
+            rows.push(row(&name, "°", kind, RPE, None, &|score| Some(over(score)?.rotation_rmse_deg)));
         }
-        let chain = |score: &RunScore| score.chain;
+        let length = |score: &RunScore| Some(score.accuracy.as_ref()?.length_m);
+        let length_meaning = "Length of the ground-truth path over the estimated frames";
+        let first = "Stamp of the first frame with an estimated pose";
         rows.extend([
-            extrinsics(row("extrinsics error, mean", "mm", less, Some(2), &|score| {
-                Some(1e3 * chain(score)?.translation_mean_m)
-            })),
-            extrinsics(row("extrinsics error, mean", "°", less, Some(3), &|score| {
-                Some(chain(score)?.rotation_mean_rad.to_degrees())
-            })),
-            with(
-                "Length of the ground-truth path over the estimated frames",
-                row("path length", "m", None, Some(1), &|score| Some(score.accuracy.as_ref()?.length_m)),
-            ),
-            with("Processed frames", row("frames", "", None, Some(0), &|score| Some(score.count as f64))),
-            with(
-                "Frames with an estimated pose",
-                row("estimated frames", "", Some(false), Some(0), &|score| score.estimated.map(|count| count as f64)),
-            ),
-            with(
-                "Stamp of the first frame with an estimated pose",
-                row("initialized at", "s", less, Some(2), &|score| score.initialized_s),
-            ),
-            with(
-                "Re-initializations after a failure",
-                row("restarts", "", less, Some(0), &|score| score.restarts.map(|count| count as f64)),
-            ),
-            with(
-                "Estimated calibration parameters of the last step",
-                row("calibration columns", "", None, Some(0), &|score| score.columns.map(|count| count as f64)),
-            ),
-            with(
+            row("extrinsics error, mean", "mm", ScoreKind::Extrinsics, EXTRINSICS, Some(2), &|score| {
+                Some(1e3 * score.chain?.translation_mean_m)
+            }),
+            row("extrinsics error, mean", "°", ScoreKind::Extrinsics, EXTRINSICS, Some(3), &|score| {
+                Some(score.chain?.rotation_mean_rad.to_degrees())
+            }),
+            ScoreRow {
+                less_is_better: None,
+                ..row("path length", "m", ScoreKind::Exact, length_meaning, Some(1), &length)
+            },
+            count("frames", "Processed frames", |score| Some(score.count)),
+            ScoreRow {
+                less_is_better: Some(false),
+                ..count("estimated frames", "Frames with an estimated pose", |score| score.estimated)
+            },
+            row("initialized at", "s", ScoreKind::Exact, first, Some(2), &|score| score.initialized_s),
+            ScoreRow {
+                less_is_better: Some(true),
+                ..count("restarts", "Re-initializations after a failure", |score| score.restarts)
+            },
+            count("calibration columns", "Estimated calibration parameters of the last step", |score| score.columns),
+            count(
+                "determined parameters",
                 "Parameters that the whole flight determines: σ below 0.3 of the prior σ",
-                row("determined parameters", "", None, Some(0), &|score| score.determined.map(|count| count as f64)),
+                |score| score.determined,
             ),
-            with(
-                "Informed rank of the last step with a calibration",
-                row("informed rank at the end", "", None, Some(0), &|score| score.informed.map(|rank| rank as f64)),
-            ),
+            count("informed rank at the end", "Informed rank of the last step with a calibration", |score| {
+                score.informed
+            }),
         ]);
         for row in &mut rows {
             self.add_scatter(row);

@@ -1,6 +1,5 @@
 //! The convergence panel: one small plot per calibration parameter, along the chain and in groups.
 
-mod csv;
 mod groups;
 mod layout;
 mod model;
@@ -20,8 +19,10 @@ use super::derived::chain_values::{ParameterValues, true_values};
 use super::parameter_names::part_of;
 use super::plot::Wheel;
 use super::widgets::empty_ui;
-use super::{Panel, PanelContext};
+use super::{CsvTable, Panel, PanelContext};
 use crate::gimbal::{ParameterGroup, ParameterId};
+use crate::session::{StepColumn, StepRecord};
+use crate::table::csv;
 
 /// State of the convergence panel: the calibration of each run over time, and its curves.
 #[derive(Debug, Default)]
@@ -33,6 +34,25 @@ pub struct ConvergencePanel {
     /// View of a calibration with more than one group.
     view: ConvergenceView,
     folded: Vec<ParameterGroup>,
+}
+
+impl CsvTable for ConvergencePanel {
+    /// The calibration of the shown run over the whole recording, with the ground truth in the parameterization at the
+    /// cursor.
+    fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {
+        let Some(run) = ctx.selected_run() else { return String::new() };
+        let (rig, names) = (&ctx.recording.rig, ctx.names());
+        let ground_truth = true_values(ctx.recording, run, ctx.cursor_ns).unwrap_or_default();
+        let mut columns = vec![StepRecord::stamp_column()];
+        for (parameter, estimate) in run.parameter_columns(rig) {
+            let (name, ground_truth) = (names.name(parameter), ground_truth.get(&parameter).copied());
+            columns.extend(estimate);
+            columns
+                .push(StepColumn::new(format!("{name}_truth_{}", parameter.dimension().unit()), move |_| ground_truth));
+        }
+        let estimated = run.steps.iter().filter(|step| step.report.newest().is_some());
+        csv(&columns, estimated.map(std::sync::Arc::as_ref))
+    }
 }
 
 impl Panel for ConvergencePanel {

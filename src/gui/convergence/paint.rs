@@ -202,7 +202,7 @@ pub(super) fn cell_ui(
     let shown_run = data.shown;
     let Some(history) = data.histories.get(shown_run) else { return };
     let Some(parameter) = history.parameter(id) else { return };
-    let shown = Shown::of_parameter(id);
+    let shown = id.shown();
     let name = &ctx.names().name(id);
     let theme = *ctx.theme;
     let (begin_ns, end_ns) = visible_range(ctx);

@@ -2,10 +2,11 @@
 
 use egui::{RichText, Ui};
 
-use super::rows::{rows_ui, table_ui};
+use super::rows::{ROW_HEIGHT, rows_ui};
 use crate::frontend::FeatureId;
 use crate::gui::PanelContext;
 use crate::gui::help::terms::{feature, observations};
+use crate::gui::table::{grid_ui, named};
 use crate::gui::units::{fixed, significant};
 use crate::session::StepRecord;
 
@@ -67,5 +68,5 @@ pub(super) fn ui(ui: &mut Ui, ctx: &PanelContext<'_>, step: &StepRecord, id: Fea
             fixed(one.robust_weight, 2),
         ]
     });
-    table_ui(ui, theme, "observations", &columns, lines);
+    grid_ui(ui, theme, ("observations", ROW_HEIGHT), &named(&columns), lines);
 }

@@ -4,14 +4,15 @@ use std::sync::Arc;
 
 use egui::{RichText, Ui};
 
-use super::rows::headed_table_ui;
+use super::rows::ROW_HEIGHT;
 use crate::estimator::{JacobianFactor, StepJacobian};
 use crate::frontend::FeatureId;
 use crate::gimbal::ParameterId;
 use crate::gui::PanelContext;
 use crate::gui::help::terms::block;
 use crate::gui::jacobian::cameras;
-use crate::gui::units::{Shown, fixed, significant};
+use crate::gui::table::{grid_ui, named};
+use crate::gui::units::{fixed, significant};
 use crate::session::{RunRecord, StepRecord};
 
 /// Number of links shown for a feature or parameter.
@@ -135,11 +136,11 @@ pub(super) fn block_ui(
         ui.label(RichText::new("No such block in this step").color(ctx.theme.text_weak));
         return;
     };
-    let shown = Shown::of_parameter(parameter);
+    let shown = parameter.shown();
     let unit = shown.unit.trim();
     let known = [block::FRAME, block::RESIDUAL_U, block::RESIDUAL_V, block::CHI2];
     let slopes = [block::SLOPE_U, block::SLOPE_V].map(|term| (format!("{}, px/{unit}", term.name), term));
-    let heads: Vec<_> = known.into_iter().map(|term| (term.name.to_owned(), term)).chain(slopes).collect();
+    let heads: Vec<_> = named(&known).into_iter().chain(slopes).collect();
     let lines = rows.frames.iter().enumerate().filter_map(|(place, frame)| {
         let seen = feature.observations.iter().find(|seen| seen.frame_index == frame.0)?;
         let residual = seen.residual_after_px.map_or([f64::NAN; 2], |residual| [residual.x, residual.y]);
@@ -154,5 +155,5 @@ pub(super) fn block_ui(
     });
     let caption = "Residuals Δu, Δv after the solve and derivatives of the projection";
     ui.label(RichText::new(caption).small().color(ctx.theme.text_weak));
-    headed_table_ui(ui, ctx.theme, "block", &heads, lines);
+    grid_ui(ui, ctx.theme, ("block", ROW_HEIGHT), &heads, lines);
 }

@@ -8,7 +8,7 @@ use crate::gui::PanelContext;
 use crate::gui::derived::chain_values::true_values;
 use crate::gui::help::terms::parameter as terms;
 use crate::gui::parameter_names::meaning_of;
-use crate::gui::units::{Shown, fixed};
+use crate::gui::units::fixed;
 use crate::session::{RunRecord, StepRecord};
 use crate::text::Named as _;
 
@@ -22,7 +22,7 @@ pub(super) fn ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, step: &St
         return;
     };
     let entry = |values: &[f64]| values.get(index).copied().unwrap_or(f64::NAN);
-    let shown = Shown::of_parameter(parameter);
+    let shown = parameter.shown();
     let (value, sigma, prior) =
         (entry(&calibration.values), entry(&calibration.sigmas), entry(&calibration.prior_sigmas));
     let mut rows = vec![

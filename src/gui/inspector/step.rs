@@ -2,12 +2,13 @@
 
 use egui::{RichText, Sense, Ui, vec2};
 
-use super::rows::{Row, rows_ui, table_ui};
-use crate::estimator::StepReport;
+use super::rows::{ROW_HEIGHT, Row, rows_ui};
+use crate::estimator::{Stage, StageTimes, StepReport};
 use crate::geometry::{principal_angle, so3};
 use crate::gui::PanelContext;
 use crate::gui::events::{look_of, name_of, paint_mark};
 use crate::gui::help::terms::{Term, frame, iterations, joints, times};
+use crate::gui::table::{grid_ui, named};
 use crate::gui::theme::Theme;
 use crate::gui::units::{fixed, seconds, significant};
 use crate::session::{RunRecord, StepRecord};
@@ -66,7 +67,7 @@ pub(super) fn frame_ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, ste
             vec![name, shown(*angle), shown(encoder), shown(angle - encoder)]
         });
         let columns = [joints::JOINT, joints::ESTIMATE, joints::ENCODER, joints::DIFFERENCE];
-        table_ui(ui, ctx.theme, "joints", &columns, lines);
+        grid_ui(ui, ctx.theme, ("joints", ROW_HEIGHT), &named(&columns), lines);
     }
 }
 
@@ -121,21 +122,23 @@ pub(super) fn iterations_ui(ui: &mut Ui, theme: &Theme, report: &StepReport) {
         iterations::DAMPING,
         iterations::ACCEPTED,
     ];
-    table_ui(ui, theme, "iterations", &columns, lines);
+    grid_ui(ui, theme, ("iterations", ROW_HEIGHT), &named(&columns), lines);
 }
 
 /// Table of the stage times in milliseconds.
 pub(super) fn times_ui(ui: &mut Ui, theme: &Theme, report: &StepReport) {
-    let stages = &report.times;
-    let row = |term: Term, value: f64| -> Row { (term, vec![format!("{} ms", fixed(value, 1))]) };
-    let rows = [
-        row(times::FRONTEND, stages.frontend_ms),
-        row(times::OPTIMIZE, stages.optimize_ms),
-        row(times::LINEARIZE, stages.linearize_ms),
-        row(times::REPORT, stages.report_ms),
-        row(times::MARGINALIZE, stages.marginalize_ms),
-        row(times::OBSERVABILITY, stages.observability_ms),
-        row(times::TOTAL, stages.step_ms),
+    let row = |(term, stage): (&Term, &Stage)| -> Row {
+        (*term, vec![format!("{} ms", fixed((stage.time_ms)(&report.times), 1))])
+    };
+    let terms = [
+        times::FRONTEND,
+        times::OPTIMIZE,
+        times::LINEARIZE,
+        times::REPORT,
+        times::MARGINALIZE,
+        times::OBSERVABILITY,
+        times::TOTAL,
     ];
+    let rows: Vec<Row> = terms.iter().zip(&StageTimes::STAGES).map(row).collect();
     rows_ui(ui, theme, "times", &rows);
 }

@@ -2,14 +2,14 @@
 
 use egui::{Label, RichText, ScrollArea, Ui, vec2};
 
-use super::factors;
+use super::factors::{self, NUMBERS};
 use super::model::{JacobianModel, cameras, joint_columns, name_of, per, unit_text};
-use super::numbers_table::numbers_ui;
 use crate::estimator::{ColumnBlock, ColumnId, FeatureRows, FrameId, JacobianFactor};
 use crate::frontend::FeatureId;
 use crate::geometry::{Dimension, principal_angle};
 use crate::gui::PanelContext;
 use crate::gui::help::terms::{Term, jacobian as terms};
+use crate::gui::table::{grid_ui, named};
 use crate::gui::units::{Shown, fixed, significant};
 use crate::session::{RunRecord, StepRecord};
 
@@ -159,7 +159,7 @@ fn observations_ui(
         }
         Some(cells)
     });
-    numbers_ui(ui, ctx, &heads, lines);
+    grid_ui(ui, ctx.theme, NUMBERS, &heads, lines);
 }
 
 /// Table with a row per encoder: its reading, its residual, and the derivatives of the residual with respect to the
@@ -192,13 +192,8 @@ fn readings_ui(
             slope,
         ]
     });
-    numbers_ui(
-        ui,
-        ctx,
-        &[terms::JOINT, terms::READING, terms::ESTIMATE, terms::SIGMA, terms::RESIDUAL, terms::ENCODER_SLOPE]
-            .map(|term| (term.name.to_owned(), term)),
-        lines,
-    );
+    let columns = [terms::JOINT, terms::READING, terms::ESTIMATE, terms::SIGMA, terms::RESIDUAL, terms::ENCODER_SLOPE];
+    grid_ui(ui, ctx.theme, NUMBERS, &named(&columns), lines);
 }
 
 /// Scalar columns of a block: label, and shown units per stored unit.
@@ -209,7 +204,7 @@ fn scalar_columns(block: &ColumnBlock, joint_count: usize) -> Vec<(String, f64)>
     };
     match block.id {
         ColumnId::Calibration(parameter) => {
-            let shown = Shown::of_parameter(parameter);
+            let shown = parameter.shown();
             vec![(format!(", {}", per("px", shown)), shown.factor)]
         }
         ColumnId::Joints(_) => joint_columns(block.len, joint_count)

@@ -4,13 +4,16 @@
 use egui::{RichText, Ui};
 
 use super::model::{JacobianModel, joint_columns, per};
-use super::numbers_table::numbers_ui;
 use crate::estimator::{ColumnBlock, ColumnId, FactorRows, JacobianFactor};
 use crate::geometry::Dimension;
 use crate::gui::PanelContext;
 use crate::gui::help::terms::jacobian as terms;
+use crate::gui::table::{grid_ui, named};
 use crate::gui::units::{Shown, fixed, significant};
 use crate::session::{Command, RunRecord};
+
+/// Id and row height of the tables of numbers.
+pub(super) const NUMBERS: (&str, f32) = ("block numbers", 14.0);
 
 /// Maximum number of rows shown, the largest first; a marginalization prior has more than a hundred.
 const MAX_ROWS: usize = 40;
@@ -68,15 +71,14 @@ pub(super) fn block_ui(
         significant(squared)
     );
     ui.label(RichText::new(text).color(ctx.theme.text));
-    let known = [terms::ROW, terms::RESIDUAL].map(|term| (term.name.to_owned(), term));
     let slopes = parts.iter().map(|(name, _)| (name.clone(), terms::ROW_SLOPE));
-    let heads: Vec<_> = known.into_iter().chain(slopes).collect();
+    let heads: Vec<_> = named(&[terms::ROW, terms::RESIDUAL]).into_iter().chain(slopes).collect();
     let lines = order.iter().map(|row| {
         let mut cells = vec![(row + 1).to_string(), fixed(rows[(*row, residuals)], 3)];
         cells.extend(parts.iter().enumerate().map(|(part, (_, factor))| significant(own[(*row, part)] / factor)));
         cells
     });
-    numbers_ui(ui, ctx, &heads, lines);
+    grid_ui(ui, ctx.theme, NUMBERS, &heads, lines);
 }
 
 /// Scalar columns of a block: label of the derivative, and shown units per stored unit.
@@ -90,7 +92,7 @@ fn scalar_columns(block: &ColumnBlock, joint_count: usize) -> Vec<(String, f64)>
     let degrees = 1_f64.to_degrees();
     match block.id {
         ColumnId::Calibration(parameter) => {
-            let shown = Shown::of_parameter(parameter);
+            let shown = parameter.shown();
             vec![(format!("∂, {}", per("σ", shown)), shown.factor)]
         }
         ColumnId::Joints(_) => joint_columns(block.len, joint_count)

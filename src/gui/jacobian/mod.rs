@@ -2,11 +2,9 @@
 //!
 //! Rows are factors, columns are unknowns; the colour of a block is its norm.
 
-mod csv;
 mod details;
 mod factors;
 mod model;
-mod numbers_table;
 mod paint;
 #[cfg(test)]
 mod tests;
@@ -21,9 +19,10 @@ use super::help::terms::window;
 use super::plot::pan_zoom::PanZoom;
 use super::under_pointer::{Item, offer, offer_item};
 use super::widgets::{describe, empty_ui};
-use super::{Panel, PanelContext};
-use crate::estimator::{ColumnId, JacobianFactor};
+use super::{CsvTable, Panel, PanelContext};
+use crate::estimator::{ColumnId, JacobianFactor, JacobianRow};
 use crate::session::{RunRecord, StepRecord};
+use crate::table::{Column, csv};
 
 /// Maximum magnification of the matrix.
 const MAX_ZOOM: f32 = 40.0;
@@ -51,6 +50,30 @@ pub struct JacobianPanel {
     /// Height in points of the column names: the largest so far of the run with this id, so that the matrix keeps its
     /// size from step to step.
     names_height: (u64, f32),
+}
+
+impl CsvTable for JacobianPanel {
+    /// Norms of the Jacobian's blocks as in the panel, one factor per row; zeros are empty.
+    fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {
+        type FactorColumn<'a> = Column<'a, JacobianRow>;
+        let Some(run) = ctx.selected_run() else { return String::new() };
+        let Some(step) = run.step_at(ctx.cursor_ns) else { return String::new() };
+        let cameras = cameras(&ctx.recording.rig, run, step);
+        let Some(jacobian) = step.report.jacobian(&cameras) else { return String::new() };
+        let names = ctx.names();
+        let mut columns = vec![
+            FactorColumn::new("residuals", |row| name_of(&row.factor)),
+            FactorColumn::new("rows", |row| row.height),
+        ];
+        columns.extend(FactorColumn::each(
+            jacobian.columns.iter().enumerate(),
+            |(_, block)| column_name(block.id, &names),
+            |row, (index, _)| {
+                row.norms.iter().find(|(of, _)| usize::from(*of) == *index).map(|(_, norm)| norm.to_string())
+            },
+        ));
+        csv(&columns, &jacobian.rows)
+    }
 }
 
 impl Panel for JacobianPanel {

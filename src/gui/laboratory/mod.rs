@@ -4,7 +4,6 @@
 //! The experiments are those of `dcvins degeneracy`, the planned motions those of `dcvins plan`.
 
 mod choices;
-mod csv;
 mod plan;
 mod request;
 #[cfg(test)]
@@ -20,10 +19,12 @@ use self::plan::PlanView;
 use self::worker::Worker;
 use super::help::terms::window;
 use super::rank::columns::{RankColumn, columns_ui};
-use super::{Panel, PanelContext};
+use super::{CsvTable, Panel, PanelContext};
+use crate::gimbal::ParameterId;
 use crate::observability::RankReport;
 use crate::observability::laboratory::{LaboratoryReport, LaboratoryResult};
 use crate::simulation::PrescribedMotion;
+use crate::table::{Column, csv};
 use crate::text::Named as _;
 
 /// Content of the laboratory panel.
@@ -45,6 +46,40 @@ pub struct LaboratoryPanel {
     choices: Choices,
     worker: Worker,
     plan: PlanView,
+}
+
+impl CsvTable for LaboratoryPanel {
+    /// Singular values and directions of each parameterization, or σ after the planned motion; one row per singular value
+    /// or weight of a direction.
+    fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {
+        /// Parameterization, kind, number from 1, singular value, and for a direction the weight of a parameter.
+        type SpectrumRow<'a> = (&'a str, &'static str, usize, f64, Option<(ParameterId, f64)>);
+        type SpectrumColumn<'a> = Column<'a, SpectrumRow<'a>>;
+        if self.view == LaboratoryView::Plan {
+            return self.plan.csv_table(ctx);
+        }
+        let (ranks, names) = (self.ranks(ctx), ctx.names());
+        let columns = [
+            SpectrumColumn::new("form", |(form, ..)| *form),
+            SpectrumColumn::new("kind", |(_, kind, ..)| *kind),
+            SpectrumColumn::new("number", |(_, _, number, ..)| *number),
+            SpectrumColumn::new("singular_value", |(.., value, _)| *value),
+            SpectrumColumn::new("parameter", |(.., of)| of.map(|(parameter, _)| names.name(parameter))),
+            SpectrumColumn::new("weight", |(.., of)| of.map(|(_, weight)| weight)),
+        ];
+        let mut rows = Vec::new();
+        for (form, rank) in &ranks {
+            let values = (1..).zip(&rank.singular_values);
+            rows.extend(values.map(|(number, value)| (form.as_str(), "singular value", number, *value, None)));
+            for (number, direction) in (1..).zip(&rank.directions) {
+                let weights = rank.parameters.iter().zip(&direction.weights).filter(|(_, weight)| **weight != 0.0);
+                rows.extend(weights.map(|(parameter, weight)| {
+                    (form.as_str(), direction.kind(), number, direction.singular_value, Some((*parameter, *weight)))
+                }));
+            }
+        }
+        csv(&columns, rows)
+    }
 }
 
 impl Panel for LaboratoryPanel {

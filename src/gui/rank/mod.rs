@@ -3,7 +3,6 @@
 mod advice;
 pub(super) mod columns;
 mod compare;
-mod csv;
 mod flight;
 mod groups;
 mod heat_map;
@@ -34,10 +33,12 @@ use super::plot::{
 };
 use super::theme::{CURVE_WIDTH, RunStyle, Theme};
 use super::widgets::empty_ui;
-use super::{Panel, PanelContext};
+use super::{CsvTable, Panel, PanelContext};
 use crate::gimbal::ParameterNames;
+use crate::observability::CalibrationDirection;
 use crate::observability::RankReport;
 use crate::session::{LostSince, RunRecord, StepRecord};
+use crate::table::{Column, csv};
 
 /// Columns of the tables over time.
 const STRUCTURAL: usize = 0;
@@ -76,6 +77,35 @@ pub struct RankPanel {
     all_runs: bool,
     /// True if the content is higher than the panel, so that the wheel scrolls.
     overflows: bool,
+}
+
+impl CsvTable for RankPanel {
+    /// Singular values of the step at the cursor, one per row, and each null or uninformed direction as weights by
+    /// parameter name.
+    fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {
+        /// Row of an index in descending order.
+        type ValueColumn<'a> = Column<'a, usize>;
+        let Some(run) = ctx.selected_run() else { return String::new() };
+        let Some(rank) = run.step_at(ctx.cursor_ns).and_then(|step| step.rank.as_ref()) else { return String::new() };
+        let count = rank.singular_values.len();
+        // Directions start with the least observable one, singular values with the largest.
+        let direction = |index: usize| rank.directions.get(count - 1 - index);
+        let mut columns = vec![
+            ValueColumn::new("number", |index| index + 1),
+            ValueColumn::new("singular_value", |index| rank.singular_values[*index]),
+            ValueColumn::new("singular_value_with_priors", |index| {
+                rank.singular_values_with_priors.get(*index).copied()
+            }),
+            ValueColumn::new("kind", |index| direction(*index).map_or("informed", CalibrationDirection::kind)),
+        ];
+        let names = ctx.names();
+        columns.extend(ValueColumn::each(
+            rank.parameters.iter().enumerate(),
+            |(_, parameter)| names.name(**parameter),
+            |index, (column, _)| direction(*index)?.weights.get(*column).copied(),
+        ));
+        csv(&columns, 0..count)
+    }
 }
 
 impl Panel for RankPanel {

@@ -5,7 +5,7 @@ use egui::{ComboBox, Label, RichText, Role, Slider, Ui, WidgetInfo};
 
 use crate::gimbal::ParameterId;
 use crate::gui::PanelContext;
-use crate::gui::units::{Shown, fixed, significant};
+use crate::gui::units::{fixed, significant};
 use crate::observability::{
     CalibrationDirection, ChainSlide, RankReport, SlideDirection, SlidePosition, chain_of_step, parameters_of_weights,
 };
@@ -136,7 +136,7 @@ fn outcome_ui(ui: &mut Ui, ctx: &PanelContext<'_>, slide: &ChainSlide, parameter
     let scaled = |column: &usize| (slide.changes[*column] / parameters[*column].scale()).abs();
     moved.sort_by(|a, b| scaled(b).total_cmp(&scaled(a)));
     let changes = moved.iter().take(CHANGES_SHOWN).filter(|column| scaled(column) > 1e-3).map(|column| {
-        let shown = Shown::of_parameter(parameters[*column]);
+        let shown = parameters[*column].shown();
         format!("{} {}{}", names.name(parameters[*column]), signed(slide.changes[*column] * shown.factor), shown.unit)
     });
     let text = changes.collect::<Vec<_>>().join(", ");

@@ -2,11 +2,13 @@
 
 use super::image_plane::{ImageGeometry, ImageMeans};
 use super::{ResidualView, ResidualsPanel, rms_px};
-use crate::estimator::FactorKind;
-use crate::files::csv_writer::{CsvWriter, number_cell, seconds_cell};
+use crate::estimator::{FactorKind, ResidualSummary};
 use crate::gui::{CsvTable, PanelContext};
-use crate::session::{ImageResiduals, StepRecord};
+use crate::session::{ImageResiduals, ResidualSum, RunRecord, StepRecord};
+use crate::table::{Column, Stamp, csv, distinct};
 use crate::text::Named as _;
+
+type StepColumn<'a> = Column<'a, (&'a RunRecord, &'a StepRecord)>;
 
 impl CsvTable for ResidualsPanel {
     /// Reprojection RMS and χ² by kind of factor, for every step of every run.
@@ -15,63 +17,53 @@ impl CsvTable for ResidualsPanel {
         if self.view == ResidualView::ImagePlane {
             return image_plane_table(ctx);
         }
-        let solved = |step: &&std::sync::Arc<StepRecord>| !step.report.window.is_empty();
-        let mut factors: Vec<FactorKind> = Vec::new();
-        for summary in ctx.recording.runs.iter().flat_map(|run| &run.steps).flat_map(|step| &step.report.residuals) {
-            if !factors.contains(&summary.factor) {
-                factors.push(summary.factor);
-            }
-        }
-        let mut columns = ["t_s", "run", "rms_before_px", "rms_after_px"].map(str::to_owned).to_vec();
-        for factor in &factors {
-            let factor = factor.name();
-            columns.extend(["count", "chi2_before", "chi2_after"].map(|part| format!("{factor}_{part}")));
-        }
-        let mut table = CsvWriter::new(columns);
-        for run in &ctx.recording.runs {
-            for step in run.steps.iter().filter(solved) {
-                let report = &step.report;
-                let heads = [
-                    seconds_cell(report.stamp_ns),
-                    run.spec.label.clone(),
-                    number_cell(report.reprojection_rms_before_px),
-                    number_cell(rms_px(report)),
-                ];
-                let cells = factors.iter().flat_map(|factor| {
-                    let summary = report.residuals.iter().find(|summary| summary.factor == *factor);
-                    summary.map_or_else(Default::default, |summary| {
-                        [summary.count.to_string(), number_cell(summary.chi2_before), number_cell(summary.chi2_after)]
-                    })
-                });
-                table.row(heads.into_iter().chain(cells));
-            }
-        }
-        table.into_text()
+        let mut columns = vec![
+            StepColumn::new("t_s", |(_, step)| Stamp(step.report.stamp_ns)),
+            StepColumn::new("run", |(run, _)| run.spec.label.as_str()),
+            StepColumn::new("rms_before_px", |(_, step)| step.report.reprojection_rms_before_px),
+            StepColumn::new("rms_after_px", |(_, step)| rms_px(&step.report)),
+        ];
+        let steps = || ctx.recording.runs.iter().flat_map(|run| run.steps.iter().map(move |step| (run, &**step)));
+        let factors = distinct(steps().flat_map(|(_, step)| &step.report.residuals).map(|summary| summary.factor));
+        columns.extend(factors.into_iter().flat_map(|factor| {
+            let name = |part: &str| format!("{}_{part}", factor.name());
+            [
+                StepColumn::new(name("count"), move |(_, step)| Some(summary_of(step, factor)?.count)),
+                StepColumn::new(name("chi2_before"), move |(_, step)| Some(summary_of(step, factor)?.chi2_before)),
+                StepColumn::new(name("chi2_after"), move |(_, step)| Some(summary_of(step, factor)?.chi2_after)),
+            ]
+        }));
+        csv(&columns, steps().filter(|(_, step)| !step.report.window.is_empty()))
     }
 }
 
+fn summary_of(step: &StepRecord, factor: FactorKind) -> Option<&ResidualSummary> {
+    step.report.residuals.iter().find(|summary| summary.factor == factor)
+}
+
 fn image_plane_table(ctx: &PanelContext<'_>) -> String {
-    let columns =
-        ["run", "part", "u_from_px", "u_to_px", "v_from_px", "v_to_px", "count", "mean_u_px", "mean_v_px", "error_px"];
-    let mut table = CsvWriter::new(columns.map(str::to_owned).to_vec());
+    /// Run, part of the run, edges in u and in v, and the residuals of a cell.
+    type CellColumn<'a> = Column<'a, (&'a str, &'static str, [[f64; 2]; 2], ResidualSum)>;
+    let columns = [
+        CellColumn::new("run", |(run, ..)| *run),
+        CellColumn::new("part", |(_, part, ..)| *part),
+        CellColumn::new("u_from_px", |(_, _, [u, _], _)| u[0]),
+        CellColumn::new("u_to_px", |(_, _, [u, _], _)| u[1]),
+        CellColumn::new("v_from_px", |(_, _, [_, v], _)| v[0]),
+        CellColumn::new("v_to_px", |(_, _, [_, v], _)| v[1]),
+        CellColumn::new("count", |(.., cell)| cell.count),
+        CellColumn::new("mean_u_px", |(.., cell)| cell.mean_px().map(|mean_px| mean_px.x)),
+        CellColumn::new("mean_v_px", |(.., cell)| cell.mean_px().map(|mean_px| mean_px.y)),
+        CellColumn::new("error_px", |(.., cell)| cell.mean_px().map(|_| cell.error_px())),
+    ];
     let run = ctx.selected_run();
     let shown = run.and_then(|run| Some((run, run.step_at(ctx.cursor_ns)?, ImageGeometry::of(ctx, run)?)));
     let Some((run, step, frame)) = shown else { return String::new() };
     let window = ImageResiduals::of_window(&step.report);
-    for (part, residuals) in [("window", &window), ("flight", &run.image_residuals)] {
-        for (index, cell) in ImageMeans::of(residuals, &frame).cells.iter().enumerate() {
-            let [u, v] = frame.cell_px(index);
-            let mean_px = cell.mean_px();
-            let mean = |value: Option<f64>| value.map_or_else(String::new, number_cell);
-            let edges = [u[0], u[1], v[0], v[1]].map(number_cell);
-            let cells = [run.spec.label.clone(), part.to_owned()].into_iter().chain(edges).chain([
-                cell.count.to_string(),
-                mean(mean_px.map(|mean_px| mean_px.x)),
-                mean(mean_px.map(|mean_px| mean_px.y)),
-                mean(mean_px.map(|_| cell.error_px())),
-            ]);
-            table.row(cells);
-        }
-    }
-    table.into_text()
+    let rows = [("window", &window), ("flight", &run.image_residuals)].into_iter().flat_map(|(part, residuals)| {
+        let cells = ImageMeans::of(residuals, &frame).cells;
+        let (frame, label) = (&frame, run.spec.label.as_str());
+        cells.into_iter().enumerate().map(move |(index, cell)| (label, part, frame.cell_px(index), cell))
+    });
+    csv(&columns, rows)
 }

@@ -4,8 +4,9 @@ use super::context::StudyPanel;
 use super::model::StudyModel;
 use super::plots::{differences, distributions, success_rates};
 use super::strips::StripPlot;
-use crate::files::csv_writer::{CsvWriter, number_cell};
-use crate::study::view::{Study, parameter_errors};
+use crate::study::view::columns::KEY;
+use crate::study::view::{ParameterErrors, RowGroup, Study, parameter_errors};
+use crate::table::{Column, csv};
 
 /// Values of a panel with a header line: runs in the stored units with all columns, plots in the shown units.
 pub(super) fn table(panel: StudyPanel, study: &Study, model: &mut StudyModel) -> String {
@@ -27,32 +28,28 @@ pub(super) fn table(panel: StudyPanel, study: &Study, model: &mut StudyModel) ->
 }
 
 fn points(study: &Study, title: &str, strips: &[StripPlot]) -> String {
-    let mut table = CsvWriter::new(["group", "key", "run", title]);
-    for strip in strips {
-        for (row, value) in &strip.points {
-            let key = study.runs.text(*row, crate::study::view::columns::KEY).unwrap_or_default().to_owned();
-            table.row([strip.name.clone(), key, study.title_of(*row), number_cell(*value)]);
-        }
-    }
-    table.into_text()
+    type PointColumn<'a> = Column<'a, (&'a StripPlot, usize, f64)>;
+    let columns = [
+        PointColumn::new("group", |(strip, ..)| strip.name.clone()),
+        PointColumn::new("key", |(_, row, _)| study.runs.text(*row, KEY).map(str::to_owned)),
+        PointColumn::new("run", |(_, row, _)| study.title_of(*row)),
+        PointColumn::new(title, |(.., value)| *value),
+    ];
+    csv(&columns, strips.iter().flat_map(|strip| strip.points.iter().map(move |(row, value)| (strip, *row, *value))))
 }
 
 fn success(study: &Study, model: &StudyModel) -> String {
-    let mut table = CsvWriter::new(["group", "rate_percent", "low_percent", "high_percent", "runs"]);
-    for (strip, group) in success_rates(study, model).into_iter().zip(&model.arranged.groups) {
-        let [low, rate, high] = strip.interval.unwrap_or([f64::NAN; 3]);
-        table.row([strip.name, number_cell(rate), number_cell(low), number_cell(high), group.rows.len().to_string()]);
-    }
-    table.into_text()
+    type SuccessColumn<'a> = Column<'a, (StripPlot, &'a RowGroup)>;
+    let columns = [
+        SuccessColumn::new("group", |(strip, _)| strip.name.clone()),
+        SuccessColumn::new("rate_percent", |(strip, _)| Some(strip.interval?[1])),
+        SuccessColumn::new("low_percent", |(strip, _)| Some(strip.interval?[0])),
+        SuccessColumn::new("high_percent", |(strip, _)| Some(strip.interval?[2])),
+        SuccessColumn::new("runs", |(_, group)| group.rows.len()),
+    ];
+    csv(&columns, success_rates(study, model).into_iter().zip(&model.arranged.groups))
 }
 
 fn parameters(study: &Study, model: &StudyModel) -> String {
-    let head = ["parameter", "unit", "runs", "error_over_sigma_rms", "error_over_sigma_mean", "within_1_sigma"];
-    let mut table = CsvWriter::new(head.into_iter().chain(["within_3_sigma", "error_rms", "sigma_median"]));
-    for of in parameter_errors(study, &study.run_of_parameter_rows(), &model.arranged.rows) {
-        let numbers = [of.ratio_rms, of.ratio_mean, of.within_1, of.within_3, of.error_rms, of.sigma_median];
-        let texts = [of.name.clone(), of.unit.to_owned(), of.points.len().to_string()];
-        table.row(texts.into_iter().chain(numbers.map(number_cell)));
-    }
-    table.into_text()
+    csv(&ParameterErrors::columns(), parameter_errors(study, &study.run_of_parameter_rows(), &model.arranged.rows))
 }

@@ -8,18 +8,8 @@ use crate::gui::plot::{GridLine, ValueAxis, ValuePlot};
 use crate::gui::theme::{ThemeName, label_font};
 use crate::gui::units::{fixed, significant};
 use crate::gui::widgets::describe;
-use crate::study::view::{ParameterErrors, SigmaVerdict, Study, parameter_errors};
-
-/// Headings of the table with their definitions.
-const HEADS: [(&str, &str); 7] = [
-    ("Parameter", "Click: show its runs on the right"),
-    ("error / σ", "Root mean square of error over σ; 1 when σ is consistent, above 1 when it is too small"),
-    ("mean", "Mean of error over σ; 0 without a bias"),
-    ("≤ 1σ", "Runs whose error is within 1 σ; 68 % when consistent"),
-    ("≤ 3σ", "Runs whose error is within 3 σ; 99.7 % when consistent"),
-    ("RMS error", "Root mean square of the errors"),
-    ("median σ", "Median of the standard deviations at the end"),
-];
+use crate::study::view::{ParameterErrors, Study, parameter_errors};
+use crate::table::Medium;
 
 /// Space in points to the left of the scatter plot for ticks and titles.
 const LEFT: f32 = 50.0;
@@ -79,8 +69,10 @@ impl ParametersPanel {
         ScrollArea::both().id_salt("parameters").auto_shrink(false).show(ui, |ui| {
             let grid = egui::Grid::new("parameter errors").striped(true).spacing(vec2(12.0, 1.0)).min_row_height(15.0);
             grid.show(ui, |ui| {
-                for (head, meaning) in HEADS {
-                    ui.label(RichText::new(head).color(theme.text_weak)).on_hover_text(meaning);
+                let columns = ParameterErrors::columns();
+                let shown: Vec<_> = columns.iter().filter_map(|it| Some((it, it.heading(Medium::Screen)?))).collect();
+                for (column, heading) in &shown {
+                    ui.label(RichText::new(*heading).color(theme.text_weak)).on_hover_text(&*column.meaning);
                 }
                 ui.end_row();
                 for (number, of) in self.errors.iter().enumerate() {
@@ -89,22 +81,9 @@ impl ParametersPanel {
                     } else if ui.selectable_label(number == chosen, &of.name).clicked() {
                         self.chosen.clone_from(&of.name);
                     }
-                    let (mark, color) = match of.verdict() {
-                        SigmaVerdict::Consistent => ("✔", theme.ok),
-                        SigmaVerdict::TooSmall => ("⚠", theme.error),
-                        SigmaVerdict::TooLarge => ("⚠", theme.warn),
-                    };
-                    ui.label(RichText::new(format!("{} {mark}", fixed(of.ratio_rms, 2))).monospace().color(color));
-                    let unit = super::plots::spaced(of.unit);
-                    let percent = |ratio: f64| format!("{} %", fixed(100.0 * ratio, 1));
-                    for text in [
-                        fixed(of.ratio_mean, 2),
-                        percent(of.within_1),
-                        percent(of.within_3),
-                        format!("{}{unit}", significant(of.error_rms)),
-                        format!("{}{unit}", significant(of.sigma_median)),
-                    ] {
-                        ui.label(RichText::new(text).monospace().color(theme.text_strong));
+                    for (column, _) in &shown[1..] {
+                        let text = RichText::new(column.shown_text(of, Medium::Screen)).monospace();
+                        ui.label(text.color(theme.tone(column.shown_tone(of))));
                     }
                     ui.end_row();
                 }

@@ -1,59 +1,55 @@
 //! Lanes of the timeline; one row per step or event.
 
 use super::TimelinePanel;
-use crate::files::csv_writer::{CsvWriter, number_cell, seconds_cell};
 use crate::gui::events::name_of;
 use crate::gui::residuals::rms_px;
 use crate::gui::{CsvTable, PanelContext};
+use crate::observability::RankReport;
+use crate::session::StepRecord;
+use crate::table::{Column, Stamp, csv};
+
+/// Name, value, threshold and message of an event or a warning.
+type EventCells<'a> = (&'static str, Option<f64>, Option<f64>, &'a str);
+/// Stamp and run of a step, or of an event.
+type LaneRow<'a> = (i64, &'a str, Option<&'a StepRecord>, Option<EventCells<'a>>);
+type LaneColumn<'a> = Column<'a, LaneRow<'a>>;
 
 impl CsvTable for TimelinePanel {
     /// A row for every step of every run, followed by one for each of its notable events and of the log's warnings.
     fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {
-        const VALUES: [&str; 7] =
-            ["phase", "keyframe", "features", "reprojection_rms_px", "rank_informed", "rank_structural", "rejected"];
-        const EVENT: [&str; 4] = ["event", "value", "threshold", "message"];
-        let mut rows: Vec<(i64, Vec<String>)> = Vec::new();
-        let event_row = |run: &str, event: [String; EVENT.len()]| -> Vec<String> {
-            std::iter::once(run.to_owned()).chain(VALUES.map(|_| String::new())).chain(event).collect()
+        let rank = |step: Option<&StepRecord>, of: fn(&RankReport) -> usize| {
+            step?.rank.as_ref().filter(|rank| !rank.parameters.is_empty()).map(of)
         };
-        for warning in &ctx.recording.warnings {
-            let cells = ["warning".to_owned(), String::new(), String::new(), warning.message.clone()];
-            rows.push((warning.stamp_ns, event_row("", cells)));
-        }
+        let columns = [
+            LaneColumn::new("t_s", |(stamp_ns, ..)| Stamp(*stamp_ns)),
+            LaneColumn::new("run", |(_, run, ..)| *run),
+            LaneColumn::new("phase", |(_, _, step, _)| Some((*step)?.report.phase.name())),
+            LaneColumn::new("keyframe", |(_, _, step, _)| Some((*step)?.report.keyframe)),
+            LaneColumn::new("features", |(_, _, step, _)| Some((*step)?.tracks.features.len())),
+            LaneColumn::new("reprojection_rms_px", |(_, _, step, _)| Some(rms_px(&(*step)?.report))),
+            LaneColumn::new("rank_informed", |(_, _, step, _)| rank(*step, |rank| rank.rank_informed)),
+            LaneColumn::new("rank_structural", |(_, _, step, _)| rank(*step, |rank| rank.rank_structural)),
+            LaneColumn::new("rejected", |(_, _, step, _)| Some((*step)?.report.counts.rejected)),
+            LaneColumn::new("event", |(.., event)| event.map(|(name, ..)| name)),
+            LaneColumn::new("value", |(.., event)| event.and_then(|(_, value, ..)| value)),
+            LaneColumn::new("threshold", |(.., event)| event.and_then(|(_, _, threshold, _)| threshold)),
+            LaneColumn::new("message", |(.., event)| event.map(|(.., message)| message)),
+        ];
+        let warnings = ctx.recording.warnings.iter();
+        let warning = |message| Some(("warning", None, None, message));
+        let mut rows: Vec<LaneRow<'_>> =
+            warnings.map(|it| (it.stamp_ns, "", None, warning(it.message.as_str()))).collect();
         for run in &ctx.recording.runs {
+            let label = run.spec.label.as_str();
             for step in &run.steps {
-                let (report, label) = (&step.report, &run.spec.label);
-                let rank = step.rank.as_ref().filter(|rank| !rank.parameters.is_empty());
-                let values = [
-                    report.phase.name().to_owned(),
-                    report.keyframe.to_string(),
-                    step.tracks.features.len().to_string(),
-                    number_cell(rms_px(report)),
-                    rank.map_or_else(String::new, |rank| rank.rank_informed.to_string()),
-                    rank.map_or_else(String::new, |rank| rank.rank_structural.to_string()),
-                    report.counts.rejected.to_string(),
-                ];
-                let nothing = EVENT.map(|_| String::new());
-                let cells = std::iter::once(label.clone()).chain(values).chain(nothing);
-                rows.push((report.stamp_ns, cells.collect()));
-                for event in report.events.iter().filter(|event| event.kind.is_notable()) {
-                    let significant = |value: Option<f64>| number_cell(value.unwrap_or(f64::NAN));
-                    let cells = [
-                        name_of(event.kind).to_owned(),
-                        significant(event.value),
-                        significant(event.threshold),
-                        event.message.clone(),
-                    ];
-                    rows.push((report.stamp_ns, event_row(label, cells)));
+                rows.push((step.report.stamp_ns, label, Some(step), None));
+                for event in step.report.events.iter().filter(|event| event.kind.is_notable()) {
+                    let cells = (name_of(event.kind), event.value, event.threshold, event.message.as_str());
+                    rows.push((step.report.stamp_ns, label, None, Some(cells)));
                 }
             }
         }
-        rows.sort_by_key(|(stamp_ns, _)| *stamp_ns);
-        let heads: Vec<&str> = ["t_s", "run"].into_iter().chain(VALUES).chain(EVENT).collect();
-        let mut table = CsvWriter::new(heads);
-        for (stamp_ns, cells) in rows {
-            table.row(std::iter::once(seconds_cell(stamp_ns)).chain(cells));
-        }
-        table.into_text()
+        rows.sort_by_key(|(stamp_ns, ..)| *stamp_ns);
+        csv(&columns, rows)
     }
 }

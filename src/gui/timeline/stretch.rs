@@ -5,7 +5,7 @@ use egui::{Context, Grid, RichText, ScrollArea, Ui, pos2, vec2};
 use crate::gimbal::ParameterId;
 use crate::gui::PanelContext;
 use crate::gui::determination::look_of;
-use crate::gui::units::{Shown, fixed, seconds};
+use crate::gui::units::{fixed, seconds};
 use crate::observability::{Determination, information_rate};
 use crate::session::{RunRecord, StepRecord};
 
@@ -116,7 +116,7 @@ impl TimelineStretch {
                 }
                 ui.end_row();
                 for row in &self.rows {
-                    let shown = Shown::of_parameter(row.parameter);
+                    let shown = row.parameter.shown();
                     let selected = ctx.selection.parameter == Some(row.parameter);
                     let name = RichText::new(names.name(row.parameter)).small();
                     if ui.selectable_label(selected, name).clicked() {

@@ -54,4 +54,14 @@ impl FlightParameter {
         let since = self.since_s().map_or_else(String::new, |since_s| format!(" since {since_s:.2} s"));
         format!("{}{ratio}{since}", self.verdict.name())
     }
+
+    /// The row as one text, for a screen reader and the clipboard.
+    pub fn sentence(&self) -> String {
+        let mut text = format!("{} {}", self.name, self.verdict_text());
+        for part in [&self.reason, &self.remedy].into_iter().filter(|part| !part.is_empty()) {
+            text.push_str("; ");
+            text.push_str(part);
+        }
+        text
+    }
 }

@@ -1,6 +1,7 @@
 //! Stored reports of every step of every run, and values derived from them without running an estimator.
 
 mod antenna_record;
+mod calibration_columns;
 mod collected_information;
 mod comparison;
 mod flight_parameter;
@@ -16,12 +17,14 @@ mod run_accuracy;
 mod run_summary;
 mod solver_trace;
 mod step;
+mod step_columns;
 mod summary;
 mod trajectory_accuracy;
 mod trajectory_lane;
 mod warning_lines;
 
 pub use antenna_record::PositionTruth;
+pub use calibration_columns::CalibrationRow;
 pub use collected_information::CollectedInformation;
 pub use comparison::{ComparedQuantity, Comparison, Divergence};
 pub use flight_parameter::FlightParameter;
@@ -32,12 +35,13 @@ pub use losses::{KnownLossSummary, LostSince};
 pub use pose_errors::{PoseConsistency, PoseError};
 pub use recording::Recording;
 pub use run::{ForkOrigin, PassProgress, RunMemory, RunRecord};
-pub use run_summary::{ParameterSummary, RunSummary, StageSummary, summarize};
+pub use run_summary::{ParameterSummary, RankSummary, RunSummary, StageSummary, TimingSummary, summarize};
 pub use solver_trace::{SolverPosition, SolverTrace};
 pub(in crate::session) use step::tracks_bytes;
 #[cfg(test)]
 pub(in crate::session) use step::warnings_of;
 pub use step::{RunWarning, StepFactorRows, StepRecord};
+pub use step_columns::{RankColumn, StepColumn};
 pub use trajectory_accuracy::{
     RELATIVE_LENGTHS_M, RelativeAccuracy, TrajectoryAccuracy, TrajectoryEvaluation, evaluate_trajectory,
 };

@@ -13,7 +13,7 @@ use super::trajectory_accuracy::TrajectoryAccuracy;
 use super::trajectory_lane::TrajectoryLane;
 use super::warning_lines::{log_warning_lines, run_warning_lines};
 use crate::calibration::ChainDistance;
-use crate::estimator::{EventKind, Phase, StageTimes};
+use crate::estimator::{EventKind, Phase, Stage, StageTimes};
 use crate::geometry::{Dimension, seconds_from_ns};
 use crate::gimbal::{ClassicalChain, ParameterId};
 use crate::observability::{Deficit, ParameterRate, information_rate};
@@ -136,19 +136,14 @@ pub struct StageSummary {
     pub max: f64,
 }
 
-/// Times of all stages in milliseconds, over the estimated frames.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct TimingSummary {
-    /// Feature tracking.
-    pub frontend: StageSummary,
-    /// Nonlinear solve of the window.
-    pub optimize: StageSummary,
-    /// Linearization for the observability analysis.
-    pub linearize: StageSummary,
-    pub report: StageSummary,
-    pub marginalize: StageSummary,
-    pub observability: StageSummary,
-    pub step: StageSummary,
+/// Times of all stages in milliseconds by their keys, over the estimated frames.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TimingSummary(pub Vec<(&'static str, StageSummary)>);
+
+impl Serialize for TimingSummary {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.0.iter().map(|(key, stage)| (key, stage)))
+    }
 }
 
 /// Content of `summary.json`.
@@ -354,23 +349,15 @@ fn information(recording: &Recording, run: &RunRecord) -> Option<InformationSumm
 fn timing_summary(run: &RunRecord) -> Option<TimingSummary> {
     let times: Vec<&StageTimes> =
         run.steps.iter().filter(|step| step.report.phase == Phase::Tracking).map(|step| &step.report.times).collect();
-    let stage = |time_of: fn(&StageTimes) -> f64| {
-        let mut sorted: Vec<f64> = times.iter().map(|times| time_of(times)).collect();
+    let summary = |stage: &Stage| {
+        let mut sorted: Vec<f64> = times.iter().map(|times| (stage.time_ms)(times)).collect();
         sorted.sort_by(f64::total_cmp);
         let at = |fraction: f64| {
             sorted.get(((sorted.len() as f64 * fraction) as usize).min(sorted.len().saturating_sub(1))).copied()
         };
-        Some(StageSummary { p50: at(0.5)?, p95: at(0.95)?, max: at(1.0)? })
+        Some((stage.key, StageSummary { p50: at(0.5)?, p95: at(0.95)?, max: at(1.0)? }))
     };
-    Some(TimingSummary {
-        frontend: stage(|times| times.frontend_ms)?,
-        optimize: stage(|times| times.optimize_ms)?,
-        linearize: stage(|times| times.linearize_ms)?,
-        report: stage(|times| times.report_ms)?,
-        marginalize: stage(|times| times.marginalize_ms)?,
-        observability: stage(|times| times.observability_ms)?,
-        step: stage(|times| times.step_ms)?,
-    })
+    StageTimes::STAGES.iter().map(summary).collect::<Option<_>>().map(TimingSummary)
 }
 
 fn real_time_factor(run: &RunRecord) -> Option<f64> {

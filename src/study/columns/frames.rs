@@ -1,10 +1,12 @@
 //! Columns of the table of frames.
 
-use super::column::Column;
 use super::job_result::JobResult;
 use crate::estimator::FrameStateReport;
 use crate::geometry::seconds_from_ns;
 use crate::session::StepRecord;
+use crate::table::Column;
+
+type FrameColumn<'a> = Column<'a, FrameRow<'a>>;
 
 /// One image of a run.
 pub(super) struct FrameRow<'a> {
@@ -30,30 +32,32 @@ impl<'a> FrameRow<'a> {
         Some(self.newest()?.world_from_imu.translation_m[axis])
     }
 
-    pub(super) const COLUMNS: &'a [Column<Self>] = &[
-        Column::text("key", "key of the run", |row| Some(row.key.to_owned())),
-        Column::count("frame", "number of the image", |row| Some(row.step.report.frame_index)),
-        Column::number("t_s", "s", "stamp since the log began", |row| Some(seconds_from_ns(row.step.report.stamp_ns))),
-        Column::flag("estimated", "whether there is a pose", |row| Some(row.newest().is_some())),
-        Column::flag("keyframe", "whether it is a keyframe", |row| Some(row.step.report.keyframe)),
-        Column::number("x_m", "m", "estimated position in the world", |row| row.position(0)),
-        Column::number("y_m", "m", "estimated position in the world", |row| row.position(1)),
-        Column::number("z_m", "m", "estimated position in the world", |row| row.position(2)),
-        Column::number(
-            "position_error_m",
-            "m",
-            "distance from the ground truth after the alignment of the whole run",
-            |row| row.error.map(|[error_m, _]| error_m),
-        ),
-        Column::number("rotation_error_rad", "rad", "angle to the ground truth after that alignment", |row| {
-            row.error.map(|[_, angle_rad]| angle_rad)
-        }),
-        Column::number("reprojection_rms_px", "px", "reprojection RMS after the solve", |row| {
-            row.newest().map(|_| row.step.report.reprojection_rms_after_px)
-        }),
-        Column::count("tracked", "tracked features", |row| Some(row.step.tracks.features.len())),
-        Column::count("rank_structural", "structural rank", |row| Some(row.step.rank.as_ref()?.rank_structural)),
-        Column::count("rank_informed", "informed rank", |row| Some(row.step.rank.as_ref()?.rank_informed)),
-        Column::number("step_ms", "ms", "time of the step", |row| Some(row.step.report.times.step_ms)),
-    ];
+    pub(super) fn columns() -> Vec<FrameColumn<'a>> {
+        let columns = [
+            FrameColumn::new("key", |row| row.key).means("", "key of the run"),
+            FrameColumn::new("frame", |row| row.step.report.frame_index).means("", "number of the image"),
+            FrameColumn::new("t_s", |row| seconds_from_ns(row.step.report.stamp_ns))
+                .means("s", "stamp since the log began"),
+            FrameColumn::new("estimated", |row| row.newest().is_some()).means("", "whether there is a pose"),
+            FrameColumn::new("keyframe", |row| row.step.report.keyframe).means("", "whether it is a keyframe"),
+            FrameColumn::new("x_m", |row| row.position(0)).means("m", "estimated position in the world"),
+            FrameColumn::new("y_m", |row| row.position(1)).means("m", "estimated position in the world"),
+            FrameColumn::new("z_m", |row| row.position(2)).means("m", "estimated position in the world"),
+            FrameColumn::new("position_error_m", |row| row.error.map(|[error_m, _]| error_m))
+                .means("m", "distance from the ground truth after the alignment of the whole run"),
+            FrameColumn::new("rotation_error_rad", |row| row.error.map(|[_, angle_rad]| angle_rad))
+                .means("rad", "angle to the ground truth after that alignment"),
+            FrameColumn::new("reprojection_rms_px", |row| {
+                row.newest().map(|_| row.step.report.reprojection_rms_after_px)
+            })
+            .means("px", "reprojection RMS after the solve"),
+            FrameColumn::new("tracked", |row| row.step.tracks.features.len()).means("", "tracked features"),
+            FrameColumn::new("rank_structural", |row| Some(row.step.rank.as_ref()?.rank_structural))
+                .means("", "structural rank"),
+            FrameColumn::new("rank_informed", |row| Some(row.step.rank.as_ref()?.rank_informed))
+                .means("", "informed rank"),
+            FrameColumn::new("step_ms", |row| row.step.report.times.step_ms).means("ms", "time of the step"),
+        ];
+        columns.into()
+    }
 }

@@ -3,8 +3,8 @@
 use crate::estimator::{EventKind, FailureCause};
 use crate::geometry::{median, seconds_from_ns};
 use crate::session::{
-    CalibrationRun, PoseConsistency, Recording, RelativeAccuracy, RunRecord, RunSpec, RunSummary, TrajectoryAccuracy,
-    TrajectoryLane,
+    CalibrationRun, PoseConsistency, RankSummary, Recording, RelativeAccuracy, RunRecord, RunSpec, RunSummary,
+    TimingSummary, TrajectoryAccuracy, TrajectoryLane,
 };
 use crate::study::StudyJob;
 
@@ -104,6 +104,14 @@ impl JobResult<'_> {
 
     pub(super) fn summary(&self) -> Option<&RunSummary> {
         Some(self.run.as_ref()?.summary)
+    }
+
+    pub(super) fn rank(&self) -> Option<&RankSummary> {
+        self.summary()?.rank.as_ref()
+    }
+
+    pub(super) fn timing(&self) -> Option<&TimingSummary> {
+        self.summary()?.timing_ms.as_ref()
     }
 
     pub(super) fn accuracy(&self) -> Option<&TrajectoryAccuracy> {

@@ -1,9 +1,11 @@
 //! Columns of the table of parameters.
 
-use super::column::Column;
 use super::job_result::JobResult;
 use crate::session::{FlightParameter, ParameterSummary};
+use crate::table::Column;
 use crate::text::Named as _;
+
+type ParameterColumn<'a> = Column<'a, ParameterRow<'a>>;
 
 /// One calibration parameter of a run.
 pub(super) struct ParameterRow<'a> {
@@ -26,25 +28,29 @@ impl<'a> ParameterRow<'a> {
         rows.collect()
     }
 
-    pub(super) const COLUMNS: &'a [Column<Self>] = &[
-        Column::text("key", "key of the run", |row| Some(row.result.key.to_owned())),
-        Column::text("log", "as in the table of runs", |row| Some(row.result.job.log.name().to_owned())),
-        Column::text("disturbance", "as in the table of runs", |row| Some(row.result.job.disturbance.clone())),
-        Column::text("perturbation", "as in the table of runs", |row| Some(row.result.job.perturbation.name.clone())),
-        Column::count("seed", "as in the table of runs", |row| row.result.seed()),
-        Column::text("run", "as in the table of runs", |row| Some(row.result.job.subject.to_string())),
-        Column::text("parameter", "name of the parameter", |row| Some(row.parameter.name.clone())),
-        Column::text("unit", "unit of the following values", |row| Some(row.parameter.dimension.unit().to_owned())),
-        Column::number("initial", "", "value in the rig", |row| Some(row.parameter.initial)),
-        Column::number("final", "", "value at the end", |row| Some(row.parameter.last)),
-        Column::number("sigma", "", "posterior standard deviation at the end", |row| row.parameter.sigma),
-        Column::number("truth", "", "ground-truth value", |row| row.parameter.ground_truth),
-        Column::number("error", "", "final minus truth", |row| row.parameter.error),
-        Column::number("ratio", "", "sigma over prior sigma at the end", |row| row.verdict?.ratio),
-        Column::text(
-            "verdict",
-            "determined, weakly determined, not determined or redundant, from the whole flight",
-            |row| Some(row.verdict?.verdict.name().to_owned()),
-        ),
-    ];
+    pub(super) fn columns() -> Vec<ParameterColumn<'a>> {
+        let columns = [
+            ParameterColumn::new("key", |row| row.result.key).means("", "key of the run"),
+            ParameterColumn::new("log", |row| row.result.job.log.name()).means("", "as in the table of runs"),
+            ParameterColumn::new("disturbance", |row| row.result.job.disturbance.clone())
+                .means("", "as in the table of runs"),
+            ParameterColumn::new("perturbation", |row| row.result.job.perturbation.name.clone())
+                .means("", "as in the table of runs"),
+            ParameterColumn::new("seed", |row| row.result.seed()).means("", "as in the table of runs"),
+            ParameterColumn::new("run", |row| row.result.job.subject.to_string()).means("", "as in the table of runs"),
+            ParameterColumn::new("parameter", |row| row.parameter.name.clone()).means("", "name of the parameter"),
+            ParameterColumn::new("unit", |row| row.parameter.dimension.unit())
+                .means("", "unit of the following values"),
+            ParameterColumn::new("initial", |row| row.parameter.initial).means("", "value in the rig"),
+            ParameterColumn::new("final", |row| row.parameter.last).means("", "value at the end"),
+            ParameterColumn::new("sigma", |row| row.parameter.sigma)
+                .means("", "posterior standard deviation at the end"),
+            ParameterColumn::new("truth", |row| row.parameter.ground_truth).means("", "ground-truth value"),
+            ParameterColumn::new("error", |row| row.parameter.error).means("", "final minus truth"),
+            ParameterColumn::new("ratio", |row| row.verdict?.ratio).means("", "sigma over prior sigma at the end"),
+            ParameterColumn::new("verdict", |row| Some(row.verdict?.verdict.name().to_owned()))
+                .means("", "determined, weakly determined, not determined or redundant, from the whole flight"),
+        ];
+        columns.into()
+    }
 }

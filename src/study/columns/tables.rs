@@ -1,24 +1,35 @@
 //! Tables of a study from the results of its jobs.
 
-use super::column::table;
 use super::frames::FrameRow;
 use super::job_result::JobResult;
 use super::parameters::ParameterRow;
-use crate::study::table::StudyTable;
+use crate::study::table::{StudyColumn, StudyTable};
+use crate::table::Column;
 
 /// Table of runs without a row.
 pub fn runs_table() -> StudyTable {
-    table(JobResult::COLUMNS, &[])
+    table(JobResult::columns(), &[])
 }
 
 /// Table of parameters without a row.
 pub fn parameters_table() -> StudyTable {
-    table(ParameterRow::COLUMNS, &[])
+    table(ParameterRow::columns(), &[])
 }
 
 /// Table of frames without a row.
 pub fn frames_table() -> StudyTable {
-    table(FrameRow::COLUMNS, &[])
+    table(FrameRow::columns(), &[])
+}
+
+fn table<Row>(columns: Vec<Column<'_, Row>>, rows: &[Row]) -> StudyTable {
+    let filled = columns.into_iter().map(|column| {
+        let mut filled = StudyColumn::new(&column.name, column.cell_type, column.unit, &column.meaning);
+        for row in rows {
+            filled.values.push(column.cell(row));
+        }
+        filled
+    });
+    StudyTable::new(filled.collect()).expect("columns have one length and different names")
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -42,9 +53,9 @@ impl StudyTables {
     pub fn of(result: &JobResult<'_>, with_frames: bool) -> Self {
         let frames = if with_frames { FrameRow::all(result) } else { Vec::new() };
         Self {
-            runs: table(JobResult::COLUMNS, std::slice::from_ref(result)),
-            parameters: table(ParameterRow::COLUMNS, &ParameterRow::all(result)),
-            frames: table(FrameRow::COLUMNS, &frames),
+            runs: table(JobResult::columns(), std::slice::from_ref(result)),
+            parameters: table(ParameterRow::columns(), &ParameterRow::all(result)),
+            frames: table(FrameRow::columns(), &frames),
         }
     }
 }

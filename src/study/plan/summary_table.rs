@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use crate::geometry::median;
 use crate::study::columns::{PAIRING_COLUMNS, runs_table};
-use crate::study::table::ColumnType::{Integer, Number};
 use crate::study::table::StudyTable;
+use crate::table::ColumnType::{Integer, Number};
 use crate::text::Named;
 
 /// Statistic that reduces the values of a group to one cell.

@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 
 use super::filter::RowFilter;
 use super::study::columns;
-use crate::study::{Cell, ColumnType, ColumnValues, StudyTable};
+use crate::study::{Cell, ColumnType, StudyTable};
 
 /// A column by which rows are sorted.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -38,25 +38,12 @@ const MAX_GROUPS: usize = 200;
 /// Rank of each row by a column's values: equal values have equal ranks, empty cells the largest.
 fn ranks(table: &StudyTable, column: &str, descending: bool) -> Vec<u32> {
     let Some(column) = table.column(column) else { return vec![0; table.rows()] };
-    let empty = |row: usize| match &column.values {
-        ColumnValues::Number(values) => values[row].is_none(),
-        ColumnValues::Integer(values) => values[row].is_none(),
-        ColumnValues::Text(values) => values[row].is_none(),
-        ColumnValues::Bool(values) => values[row].is_none(),
-    };
-    let order = |a: usize, b: usize| match &column.values {
-        ColumnValues::Number(values) => values[a].unwrap_or(0.0).total_cmp(&values[b].unwrap_or(0.0)),
-        ColumnValues::Integer(values) => values[a].cmp(&values[b]),
-        ColumnValues::Text(values) => values[a].cmp(&values[b]),
-        ColumnValues::Bool(values) => values[a].cmp(&values[b]),
-    };
+    let cells = column.values.cells();
     let compare = |a: &usize, b: &usize| {
-        let by_value = if descending { order(*b, *a) } else { order(*a, *b) };
-        match (empty(*a), empty(*b)) {
-            (false, false) => by_value,
-            (true, true) => Ordering::Equal,
-            (a, b) => a.cmp(&b),
-        }
+        let (a, b) = (&cells[*a], &cells[*b]);
+        let by_value = if descending { b.order(a) } else { a.order(b) };
+        let is_empty = |cell: &Cell| *cell == Cell::Empty;
+        is_empty(a).cmp(&is_empty(b)).then(by_value)
     };
     let mut rows: Vec<usize> = (0..table.rows()).collect();
     rows.sort_by(compare);

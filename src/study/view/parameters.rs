@@ -7,6 +7,7 @@ use serde::Serialize;
 use super::metric::Metric;
 use super::study::{Study, columns};
 use crate::geometry::{mean_square_quantile, median};
+use crate::table::{Column, Medium, Tone, significant};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ParameterPoint {
@@ -49,7 +50,67 @@ pub enum SigmaVerdict {
     TooLarge,
 }
 
+impl SigmaVerdict {
+    /// Symbol and emphasis on a screen.
+    pub const fn look(self) -> (&'static str, Tone) {
+        match self {
+            Self::Consistent => ("✔", Tone::Good),
+            Self::TooSmall => ("⚠", Tone::Bad),
+            Self::TooLarge => ("⚠", Tone::Caution),
+        }
+    }
+}
+
+type ErrorColumn = Column<'static, ParameterErrors>;
+
 impl ParameterErrors {
+    /// Columns of the table in files, on the screen and in reports.
+    pub fn columns() -> Vec<ErrorColumn> {
+        let percent = |rate: f64, medium: Medium| format!("{} %", medium.fixed(100.0 * rate, 1));
+        // On a page the unit has a column.
+        let with_unit = |value: f64, unit: &str, medium: Medium| match (medium, unit) {
+            (Medium::Page, _) => medium.fixed(value, 4),
+            (Medium::Screen, "" | "°") => format!("{}{unit}", significant(value)),
+            (Medium::Screen, _) => format!("{} {unit}", significant(value)),
+        };
+        let columns = [
+            ErrorColumn::new("parameter", |of| of.name.clone())
+                .means("", "Click: show its runs on the right")
+                .headings("Parameter", "parameter"),
+            ErrorColumn::new("unit", |of| of.unit).on_page("unit"),
+            ErrorColumn::new("runs", |of| of.points.len()).on_page("runs"),
+            ErrorColumn::new("error_over_sigma_rms", |of| of.ratio_rms)
+                .means("", "Root mean square of error over σ; 1 when σ is consistent, above 1 when it is too small")
+                .text(|of, medium| match medium {
+                    Medium::Screen => format!("{} {}", medium.fixed(of.ratio_rms, 2), of.verdict().look().0),
+                    Medium::Page => medium.fixed(of.ratio_rms, 2),
+                })
+                .tone(|of| of.verdict().look().1)
+                .headings("error / σ", "RMS of error / σ"),
+            ErrorColumn::new("error_over_sigma_mean", |of| of.ratio_mean)
+                .means("", "Mean of error over σ; 0 without a bias")
+                .text(|of, medium| medium.fixed(of.ratio_mean, 2))
+                .headings("mean", "mean of error / σ"),
+            ErrorColumn::new("within_1_sigma", |of| of.within_1)
+                .means("", "Runs whose error is within 1 σ; 68 % when consistent")
+                .text(move |of, medium| percent(of.within_1, medium))
+                .headings("≤ 1σ", "within 1 σ"),
+            ErrorColumn::new("within_3_sigma", |of| of.within_3)
+                .means("", "Runs whose error is within 3 σ; 99.7 % when consistent")
+                .text(move |of, medium| percent(of.within_3, medium))
+                .headings("≤ 3σ", "within 3 σ"),
+            ErrorColumn::new("error_rms", |of| of.error_rms)
+                .means("", "Root mean square of the errors")
+                .text(move |of, medium| with_unit(of.error_rms, of.unit, medium))
+                .headings("RMS error", "RMS error"),
+            ErrorColumn::new("sigma_median", |of| of.sigma_median)
+                .means("", "Median of the standard deviations at the end")
+                .text(move |of, medium| with_unit(of.sigma_median, of.unit, medium))
+                .headings("median σ", "median σ"),
+        ];
+        columns.into()
+    }
+
     /// Verdict on the RMS ratio of error to σ: consistent between 0.5 and 1.5, or within the 99 % interval for this
     /// number of runs.
     pub fn verdict(&self) -> SigmaVerdict {

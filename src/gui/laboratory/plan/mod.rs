@@ -2,11 +2,9 @@
 
 mod bar;
 mod begin;
-mod csv;
 mod curves;
 mod edited;
 mod planned_run;
-mod rows;
 mod settings;
 mod table;
 #[cfg(test)]
@@ -20,14 +18,17 @@ use egui::{RichText, Ui, UiBuilder, vec2};
 use self::curves::{CurveInputs, Curves};
 use self::edited::EditedMotion;
 use self::planned_run::PlannedRun;
-use self::rows::ShownPrediction;
 use self::settings::PlanSettings;
+use self::table::ShownPrediction;
 use self::worker::{MotionSigmas, PlanSearch, RunningSearch, SearchState};
 use super::request::MotionRequest;
 use crate::gui::PanelContext;
 use crate::gui::units::fixed;
-use crate::observability::laboratory::{MotionLimits, MotionPrediction, MotionProblem, MotionStart, ReachedLimit};
+use crate::observability::laboratory::{
+    MotionLimits, MotionPrediction, MotionProblem, MotionStart, PlannedRow, ReachedLimit,
+};
 use crate::simulation::{MotionSplines, PrescribedMotion};
+use crate::table::csv;
 
 /// Changes with coarse windows that a search tries.
 const TRIALS: usize = 1500;
@@ -163,7 +164,8 @@ impl PlanView {
         if let Some(edited) = &self.edited {
             self.predictions.request(&problem, edited.current(), &context, false);
         }
-        self.predictions.last().map_or_else(String::new, csv::csv_of)
+        let rows = self.predictions.last().map(|prediction| PlannedRow::all(prediction, None));
+        rows.map_or_else(String::new, |rows| csv(&PlannedRow::columns(String::new()), rows))
     }
 
     /// Problem of the selected run, with a motion of its joints and duration.

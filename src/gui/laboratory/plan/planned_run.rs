@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::settings::PlanSettings;
 use crate::geometry::seconds_from_ns;
 use crate::gui::PanelContext;
+use crate::gui::units::fixed;
 use crate::observability::laboratory::{MotionProblem, Situation};
 use crate::session::{RunRecord, RunSpec, situation_before_flight};
 
@@ -33,8 +34,8 @@ pub(super) struct PlannedRun {
 pub(super) struct FlightSoFar {
     state: Option<Arc<Situation>>,
     /// Time of that state in seconds since the log began.
-    pub(super) at_s: f64,
-    pub(super) is_whole: bool,
+    at_s: f64,
+    is_whole: bool,
     /// True if it has the parameters of the plan.
     pub(super) is_used: bool,
 }
@@ -88,6 +89,12 @@ impl PlannedRun {
 }
 
 impl FlightSoFar {
+    /// Meaning of its σ.
+    pub(super) fn meaning(&self) -> String {
+        let so_far = if self.is_whole { "its end" } else { "its last computed image" };
+        format!("Posterior σ of the selected run at {so_far}, {} s", fixed(self.at_s, 2))
+    }
+
     /// Last state of a run with a posterior.
     fn of_run(ctx: &PanelContext<'_>, run: &RunRecord) -> Option<Self> {
         let rig = &ctx.recording.rig;

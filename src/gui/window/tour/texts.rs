@@ -6,7 +6,7 @@ use crate::gimbal::{ParameterId, ParameterNames};
 use crate::gui::PanelContext;
 use crate::gui::rank::verdict::{RankVerdict, verdict};
 use crate::gui::theme::MAX_RUNS;
-use crate::gui::units::{Shown, counted, fixed};
+use crate::gui::units::{counted, fixed};
 use crate::observability::{RankReport, parameters_of};
 use crate::session::{LostSince, RunRecord, StepRecord};
 use crate::text::Named as _;
@@ -125,7 +125,7 @@ fn convergence_lines(step: &StepRecord, names: &ParameterNames) -> Vec<String> {
     let (reductions, verdicts) = (reductions(step), step.determinations());
     let line = |(index, ratio): (usize, f64)| {
         let parameter = calibration.parameters[index];
-        let shown = Shown::of_parameter(parameter);
+        let shown = parameter.shown();
         let [sigma, prior] = [&calibration.sigmas, &calibration.prior_sigmas].map(|column| shown.sigma(column[index]));
         let verdict = verdicts.get(index).map_or("", |(_, verdict)| verdict.name());
         format!("{}, σ {prior} → {sigma} ({} %: {verdict})", names.name(parameter), fixed(100.0 * ratio, 0))

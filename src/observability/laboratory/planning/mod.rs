@@ -11,6 +11,7 @@ mod limits;
 mod moves;
 mod objective;
 mod plan;
+mod planned_row;
 mod problem;
 mod search;
 mod starts;
@@ -26,6 +27,7 @@ pub use plan::{
     ListedComparison, MotionPlan, MotionPlanError, PLAN_DURATION_S, PLAN_SECONDS, PlanOptions, PlanStart, plan_by_hand,
     plan_motion,
 };
+pub use planned_row::PlannedRow;
 pub use problem::{MotionPrediction, MotionPredictor, MotionProblem, MotionStart};
 pub use search::move_point;
 pub use starts::PLAN_KNOT_S;

@@ -1,0 +1,20 @@
+//! Tables: a column is defined once, with name, unit, meaning, value, order and look.
+//!
+//! The definition stands next to the type of its rows, in the lowest folder where the values are known; files, screens
+//! and pages are made from it.
+
+mod cell;
+mod column;
+#[cfg(feature = "logs")]
+mod csv;
+#[cfg(test)]
+mod documented;
+mod number;
+
+pub use self::cell::{Cell, CellValue, ColumnType, Stamp};
+pub use self::column::{Column, Direction, Style, Tone, distinct};
+#[cfg(feature = "logs")]
+pub use self::csv::{csv, csv_text};
+#[cfg(test)]
+pub(crate) use self::documented::documented;
+pub use self::number::{Medium, Shown, fixed, significant};
