@@ -159,8 +159,7 @@ fn missing_runs_frames_and_images_are_reported() {
             FrameImage::Missing
         }
     }
-    let recording = recording();
-    let check = |run: usize, cursor_ns: i64, expected: &str| {
+    let check = |recording: &Recording, run: usize, cursor_ns: i64, expected: &str| {
         let recording = recording.clone();
         let mut harness = Harness::builder().with_size([700.0, 500.0]).build_ui(move |ui| {
             let theme = Theme::of(ThemeName::Light);
@@ -172,9 +171,12 @@ fn missing_runs_frames_and_images_are_reported() {
         harness.run();
         harness.get_by_label_contains(expected);
     };
-    check(7, 0, "No runs");
-    check(0, -1, "No image at or before the cursor");
-    check(0, i64::MAX, "frame 79");
+    let recording = recording();
+    check(&Recording { runs: Vec::new(), ..recording.clone() }, 0, 0, "No runs");
+    check(&recording, 0, -1, "No image at or before the cursor");
+    check(&recording, 0, i64::MAX, "frame 79");
+    // A selection beyond the last run shows the last run.
+    check(&recording, 7, i64::MAX, "frame 79");
 }
 
 #[test]

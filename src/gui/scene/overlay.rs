@@ -94,7 +94,12 @@ pub(super) fn legend(
     for (line, text) in lines.iter().zip(&texts) {
         let middle = at.y + 0.5 * LINE_HEIGHT;
         let sample = [pos2(at.x, middle), pos2(at.x + 28.0, middle)];
-        paint_line(painter, &sample, line.style, 2.0);
+        if line.style.dashes.is_empty() {
+            // Aligned to pixels, unlike a curve.
+            painter.line_segment(sample, Stroke::new(2.0, line.style.color));
+        } else {
+            paint_line(painter, &sample, line.style, 2.0);
+        }
         let galley = painter.layout_no_wrap((*text).to_owned(), theme::label_font(), theme.text);
         plated(painter, at + vec2(34.0, 0.0), galley, theme.text, ground);
         at.y += LINE_HEIGHT;
