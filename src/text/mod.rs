@@ -1,5 +1,6 @@
 //! Texts that people write and read: `KEY=VALUE` entries, tables of keys, conditions, names of enums, command lines.
 
+#[cfg(feature = "logs")]
 pub(crate) mod condition;
 mod entry;
 mod keys;
@@ -9,6 +10,7 @@ mod printable;
 pub use entry::{Entry, FINITE, items, numbers};
 pub use keys::{Field, Key, Label, Numbers, key_list, read_entry, read_item, written_items};
 pub use named::Named;
+#[cfg(feature = "logs")]
 pub(crate) use printable::without_bom;
 pub use printable::{
     command_line, counted, edit_distance, log_name, nearest_name, printable, printable_lines, shortened,
