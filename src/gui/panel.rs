@@ -145,7 +145,7 @@ impl<'a> PanelContext<'a> {
         self.selection.run.min(self.recording.runs.len().saturating_sub(1))
     }
 
-    /// The run at [`Self::run_number`], `None` before the first run has started.
+    /// The selected run, or the last one if the selection lies beyond it; `None` before the first run has started.
     pub fn selected_run(&self) -> Option<&'a RunRecord> {
         self.recording.runs.get(self.run_number())
     }
