@@ -325,3 +325,23 @@ fn folders_keep_their_invariants() {
     }
     fail_on(&named);
 }
+
+#[test]
+fn every_source_file_is_declared_by_its_parent() {
+    let files = source_files();
+    let text_of = |name: &str| files.iter().find(|(file, _)| file == name).map(|(_, text)| text);
+    let declared = |name: &str| {
+        let path = name.strip_suffix("/mod.rs").or_else(|| name.strip_suffix(".rs")).expect("it is a Rust file");
+        let (parents, module) = match path.rsplit_once('/') {
+            Some((parent, module)) => ([format!("{parent}.rs"), format!("{parent}/mod.rs")], module),
+            None => (["lib.rs", "main.rs"].map(str::to_owned), path),
+        };
+        parents.iter().filter_map(|parent| text_of(parent)).any(|text| text.contains(&format!("mod {module};")))
+    };
+    let orphans: Vec<String> = files
+        .iter()
+        .map(|(name, _)| name.clone())
+        .filter(|name| !["lib.rs", "main.rs"].contains(&name.as_str()) && !declared(name))
+        .collect();
+    fail_on(&orphans);
+}
