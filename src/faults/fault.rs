@@ -11,7 +11,7 @@ use crate::text::Named;
 pub enum Choice {
     Flip(ImageFlip),
     Half(ImageHalf),
-    /// Axes of the rig's IMU as those of the recording.
+    /// Axes of the rig's IMU as axes of the recording.
     Axes(SignedAxes),
 }
 
@@ -103,7 +103,7 @@ impl Fault {
         Self { joints: names.into_iter().cloned().collect(), ..self }
     }
 
-    /// Value with a number in the order of its kind; that of a fault without effect if it is unknown.
+    /// Value with a number in the order of its kind; the value of a fault without effect if it is unknown.
     pub fn value(&self, number: usize) -> f64 {
         self.values.get(number).copied().unwrap_or_else(|| self.kind.row().change(number).neutral())
     }
@@ -120,7 +120,7 @@ impl Fault {
         so3::exp(&Vector3::from_fn(|axis, _| self.value(axis)))
     }
 
-    /// True if the fault is larger than those of sound sensors and rigs, [`Row::noticeable`](super::Row).
+    /// True if the fault is larger than the faults of sound sensors and rigs, [`Row::noticeable`](super::Row).
     pub fn is_noticeable(&self) -> bool {
         let size = match self.kind {
             FaultKind::GyroscopeScale | FaultKind::JointScale => self.value(0) - 1.0,

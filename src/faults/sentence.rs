@@ -83,7 +83,7 @@ impl Subject<'_> {
         format!("the focal length of {} in the rig is {error}", self.camera_key)
     }
 
-    /// Sentence of a fault that the rotations of the camera show; `true_axes` are those of a gyroscope with a left-handed
+    /// Sentence of a fault that the rotations of the camera show; `true_axes` are the axes of a gyroscope with a left-handed
     /// frame, if they are known.
     pub fn by_rotations(&self, fault: &Fault, true_axes: Option<SignedAxes>) -> Sentence {
         let key = self.camera_key;

@@ -1,4 +1,4 @@
-//! Encoder readings of a frame: the joint angles of Eq. 7 are measured, a term in addition to those of Eq. 8.
+//! Encoder readings of a frame: the joint angles of Eq. 7 are measured, a term that Eq. 8 does not have.
 
 use super::factor::{Factor, JacobianBlock, Point, Sink, WhitenedRows};
 use super::kind::FactorLabel;

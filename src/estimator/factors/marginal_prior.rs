@@ -7,7 +7,7 @@
 //! Qᵀ [J_m J_k | r] = [R_m * | *; 0 J | r_p]
 //! ```
 //!
-//! The rows below `R_m` are the prior; it equals that of the Schur complement `H_kk − H_km H_mm⁻¹ H_mk`.
+//! The rows below `R_m` are the prior; it equals the prior of the Schur complement `H_kk − H_km H_mm⁻¹ H_mk`.
 
 use std::ops::Range;
 

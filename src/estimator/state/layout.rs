@@ -100,7 +100,7 @@ impl Layout {
         order
     }
 
-    /// Blocks of these columns; `frames` are by slot, and `parameters` those of the calibration.
+    /// Blocks of these columns; `frames` are by slot, and `parameters` by calibration column.
     pub(crate) fn blocks(&self, parameters: &[ParameterId], frames: &[FrameId]) -> Vec<ColumnBlock> {
         let of_frames = |id: fn(FrameId) -> ColumnId, len: usize| frames.iter().map(move |frame| (id(*frame), len));
         let parameters = if self.calibration > 0 { parameters } else { &[] };

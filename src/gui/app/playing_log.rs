@@ -1,4 +1,4 @@
-//! What the window needs of a session, and the session with it.
+//! The session of a log with the files and settings that the window needs beside it.
 
 use std::sync::Arc;
 

@@ -52,7 +52,7 @@ impl ImagePlacement {
     }
 }
 
-/// What is drawn over the image.
+/// Marks drawn over the image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::gui) struct MarkOptions {
     /// Residuals before or after the solve.

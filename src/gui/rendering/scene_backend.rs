@@ -1,4 +1,4 @@
-//! What draws the 3D scene of a context.
+//! The renderer of the 3D scene in a context.
 
 use egui::{Context, Id};
 

@@ -57,7 +57,7 @@ const CLOSE_UP_FROM: Vec2 = vec2(280.0, 160.0);
 /// Height in points of title and chain above a table of links, at least.
 const MIN_CHAIN_HEIGHT: f32 = 150.0;
 
-/// What the scene shows, and from where.
+/// Shown parts of the scene and its viewpoints.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::gui) struct SceneLook {
     follow: Follow,
