@@ -17,6 +17,8 @@ use crate::log_check::statistics::median;
 const OFFSET_SIGMA_S: f64 = 0.02;
 /// Prior standard deviation of the ratio of image rotations to predicted ones: a change of it is a hypothesis.
 const SCALE_SIGMA: f64 = 0.005;
+/// Number of standard deviations of the camera's orientation in its tolerance.
+const ORIENTATION_SIGMAS: f64 = 3.0;
 /// Prior standard deviation of the camera's orientation where a hypothesis takes it from the rig, in radians.
 const KEPT_ORIENTATION_RAD: f64 = 0.02;
 const ITERATIONS: usize = 8;
@@ -110,7 +112,7 @@ pub(super) struct Fitter<'a> {
     pub(super) chain: &'a ClassicalChain,
     /// With any orientation of the camera.
     priors: FitPriors,
-    /// Smallest error of the orientation that counts as one, in radians.
+    /// Smallest error of the orientation that counts as one, in radians: [`ORIENTATION_SIGMAS`] standard deviations.
     orientation_tolerance_rad: f64,
     /// Rotations of the images as recorded.
     pub(super) measured: Vec<MeasuredRotation>,
@@ -128,11 +130,12 @@ impl<'a> Fitter<'a> {
         Self { data, chain, priors, orientation_tolerance_rad, measured }
     }
 
-    /// Criterion of a fit with a number of parameters; the three parameters of the orientation count if it is not the
-    /// rig's.
+    /// Criterion of a fit with a number of parameters. The orientation is the rig's within its standard deviation, or any
+    /// one: the squared difference in standard deviations counts up to the cost of three parameters.
     pub(super) fn criterion(&self, fit: &RotationFit, parameters: usize) -> f64 {
-        let turned = if self.has_other_orientation(fit) { 3 } else { 0 };
-        fit.deviance + (parameters + turned) as f64 * self.parameter_cost()
+        let sigmas = ORIENTATION_SIGMAS * fit.orientation.angle() / self.orientation_tolerance_rad;
+        let orientation = (sigmas * sigmas).min(3.0 * self.parameter_cost());
+        fit.deviance + orientation + parameters as f64 * self.parameter_cost()
     }
 
     /// Cost of a parameter in the criterion.
