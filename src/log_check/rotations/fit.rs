@@ -19,7 +19,7 @@ const COMPARED_QUANTILE: f64 = 0.7;
 const COMPARED_SIGMAS: f64 = 0.5244;
 /// Degrees of freedom of the t distribution of a misfit: a wrong image rotation counts less than its square.
 const TAIL_DEGREES: f64 = 3.0;
-/// Steps between 1 and [`NOISE_TOLERANCE`] at which the noise level of a likelihood is tried.
+/// Steps between 1 and [`NOISE_TOLERANCE`] of the noise levels over which a likelihood is averaged.
 const NOISE_STEPS: u32 = 10;
 /// Prior standard deviation of an orientation that may be any.
 pub(crate) const FREE_ORIENTATION_RAD: f64 = 1.0;
@@ -350,8 +350,8 @@ pub(crate) fn tail_cost(square: f64) -> f64 {
     (TAIL_DEGREES + 3.0) * (square / TAIL_DEGREES).ln_1p()
 }
 
-/// −2 times the logarithm of the likelihood of squared misfits (three degrees of freedom each) by a t distribution, at the
-/// best noise level up to [`NOISE_TOLERANCE`] times the stated one.
+/// −2 times the logarithm of the likelihood of squared misfits (three degrees of freedom each) by a t distribution, averaged
+/// over noise levels up to [`NOISE_TOLERANCE`] times the stated one.
 pub(crate) fn deviance(squares: &[f64]) -> f64 {
     let at = |step: u32| {
         let level = 1.0 + (NOISE_TOLERANCE - 1.0) * f64::from(step) / f64::from(NOISE_STEPS);
@@ -359,7 +359,10 @@ pub(crate) fn deviance(squares: &[f64]) -> f64 {
         let of_pair = |square: &f64| 3.0 * variance.ln() + tail_cost(square / variance);
         squares.iter().map(of_pair).sum::<f64>()
     };
-    (0..=NOISE_STEPS).map(at).fold(f64::INFINITY, f64::min)
+    let deviances: Vec<f64> = (0..=NOISE_STEPS).map(at).collect();
+    let least = deviances.iter().copied().fold(f64::INFINITY, f64::min);
+    let likelihoods: f64 = deviances.iter().map(|deviance| (0.5 * (least - deviance)).exp()).sum();
+    least - 2.0 * (likelihoods / deviances.len() as f64).ln()
 }
 
 #[cfg(test)]
