@@ -1,13 +1,15 @@
 //! Image rotations compared with rotations of gyroscope and chain, weighted by the noise of features, gyroscope and
 //! encoders.
 
-use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Matrix6xX, UnitQuaternion, Vector3};
+use nalgebra::{DMatrix, DVector, Dyn, Matrix3, Matrix3xX, Matrix6xX, UnitQuaternion, Vector3};
 
 use crate::flight_log::stream::angle_fit::FittedAngle;
 use crate::geometry::{best_rotation, mean_square_quantile, so3};
 use crate::gimbal::{Chain, ClassicalChain, Parameterization};
 use crate::log_check::clock_alignment::BIAS_SIGMA_RAD_PER_S;
 use crate::log_check::statistics::{median, percentile};
+use crate::optimization::NormalEquations;
+use crate::optimization::damped::{DampedOptions, LeastSquares, minimize};
 
 /// Quantile of the standard normal distribution beyond which a misfit is significant.
 const SIGNIFICANT_SIGMAS: f64 = 3.0;
@@ -25,7 +27,15 @@ const NOISE_STEPS: u32 = 10;
 pub(crate) const FREE_ORIENTATION_RAD: f64 = 1.0;
 /// Standard deviation of a column that is fixed.
 const SMALLEST_SIGMA: f64 = 1e-6;
-const ITERATIONS: usize = 10;
+/// Limits of the solver: a fit ends when a step lowers its cost by less than 1e-7 of it.
+const OPTIONS: DampedOptions = DampedOptions {
+    iterations: 30,
+    relative_cost_tolerance: 1e-7,
+    first_damping: 1e-6,
+    min_damping: 1e-9,
+    max_damping: 1e6,
+    growth: 10.0,
+};
 /// Ratio of the median norm of three normal numbers to the root of the sum of their variances.
 const MEDIAN_NORM_RATIO: f64 = 0.888;
 
@@ -189,8 +199,8 @@ impl RotationFit {
         priors: &FitPriors,
         extra: &[ExtraColumn],
     ) -> Option<Self> {
-        let (fit, covariance, spread) = Self::fitted(pairs, chain, priors, extra)?;
-        Some(fit.finish(&covariance, spread))
+        let (problem, estimate, spread) = Self::fitted(pairs, chain, priors, extra)?;
+        problem.finish(&estimate, spread)
     }
 
     /// [`Self::of`] with the prediction of each pair by the fit in the frame of the measured rotations, and its covariance
@@ -200,18 +210,19 @@ impl RotationFit {
         chain: &ClassicalChain,
         priors: &FitPriors,
     ) -> Option<(Self, Vec<Prediction>)> {
-        let (fit, covariance, spread) = Self::fitted(pairs, chain, priors, &[])?;
-        let predictions = fit.rows.iter().map(|row| (row.measured - fit.residual(row), fit.covariance(row))).collect();
-        Some((fit.finish(&covariance, spread), predictions))
+        let (problem, at, spread) = Self::fitted(pairs, chain, priors, &[])?;
+        let prediction = |row: &Row| (row.measured - row.residual(&at), row.covariance_in_camera(&at));
+        let predictions = problem.rows.iter().map(prediction).collect();
+        Some((problem.finish(&at, spread)?, predictions))
     }
 
-    /// Fit with the covariance of its columns, and the ratio of the second singular value of the rotations to the first.
+    /// Problem with its solution, and the ratio of the second singular value of the rotations to the first.
     fn fitted(
         pairs: &[RotationPair],
         chain: &ClassicalChain,
         priors: &FitPriors,
         extra: &[ExtraColumn],
-    ) -> Option<(Fit, DMatrix<f64>, f64)> {
+    ) -> Option<(FitProblem, FitEstimate, f64)> {
         let is_rigid = chain.links.is_empty();
         let parameterized = Chain::from_classical(chain, Parameterization::Classical);
         let row =
@@ -220,12 +231,10 @@ impl RotationFit {
         let vectors: Vec<_> = rows.iter().map(|row| (row.predicted, row.measured)).collect();
         let (best, spread) = best_rotation(&vectors)?;
         let start = if priors.orientation_rad < FREE_ORIENTATION_RAD { UnitQuaternion::identity() } else { best };
-        let mut fit = Fit::new(rows, start, priors, is_rigid, extra);
-        let mut covariance = None;
-        for _ in 0..ITERATIONS {
-            covariance = Some(fit.update()?);
-        }
-        Some((fit, covariance?, spread))
+        let mut problem = FitProblem::new(rows, priors, is_rigid, extra);
+        let start = FitEstimate { orientation: start, values: DVector::zeros(problem.prior_information.len()) };
+        let estimate = minimize(&mut problem, start, &OPTIONS).estimate;
+        Some((problem, estimate, spread))
     }
 
     /// Largest χ² over its degrees of freedom that noise explains.
@@ -238,109 +247,141 @@ impl RotationFit {
     }
 }
 
-struct Fit {
-    rows: Vec<Row>,
+/// Unknowns of a fit.
+#[derive(Clone)]
+struct FitEstimate {
     orientation: UnitQuaternion<f64>,
     /// Values of all columns but the columns of the orientation, which are zero.
     values: DVector<f64>,
+}
+
+/// Rows of a fit with a robust loss: `ρ(s) = s` up to the largest square that noise explains, `c + c ln(s / c)` beyond it.
+struct FitProblem {
+    rows: Vec<Row>,
     prior_information: DVector<f64>,
     /// Number of extra columns, which are the last ones.
     extra: usize,
+    /// Largest squared residual that noise explains.
+    largest_square: f64,
 }
 
-impl Fit {
-    fn new(
-        rows: Vec<Row>,
-        orientation: UnitQuaternion<f64>,
-        priors: &FitPriors,
-        is_rigid: bool,
-        extra: &[ExtraColumn],
-    ) -> Self {
+impl FitProblem {
+    fn new(rows: Vec<Row>, priors: &FitPriors, is_rigid: bool, extra: &[ExtraColumn]) -> Self {
         let columns = rows.first().map_or(CHAIN + extra.len(), |row| row.jacobian.ncols());
         // Noise of a prediction by encoders would shorten the estimated scale.
         let scale = if is_rigid { priors.scale } else { SMALLEST_SIGMA };
         let mut sigmas = DVector::repeat(columns, priors.chain);
-        sigmas.rows_mut(0, CHAIN).copy_from_slice(&[
-            priors.orientation_rad,
-            priors.orientation_rad,
-            priors.orientation_rad,
-            BIAS_SIGMA_RAD_PER_S,
-            BIAS_SIGMA_RAD_PER_S,
-            BIAS_SIGMA_RAD_PER_S,
-            priors.time_offset_s,
-            scale,
-        ]);
+        sigmas.rows_mut(0, BIAS).fill(priors.orientation_rad);
+        sigmas.rows_mut(BIAS, OFFSET - BIAS).fill(BIAS_SIGMA_RAD_PER_S);
+        sigmas[OFFSET] = priors.time_offset_s;
+        sigmas[SCALE] = scale;
         for (number, column) in extra.iter().enumerate() {
             sigmas[columns - extra.len() + number] = column.sigma;
         }
         let prior_information = sigmas.map(|sigma: f64| sigma.max(SMALLEST_SIGMA).powi(-2));
-        let values = DVector::zeros(columns);
-        Self { rows, orientation, values, prior_information, extra: extra.len() }
+        let largest_square = 3.0 * mean_square_quantile(3.0, SIGNIFICANT_SIGMAS);
+        Self { rows, prior_information, extra: extra.len(), largest_square }
     }
 
-    fn residual(&self, row: &Row) -> Vector3<f64> {
-        let measured = row.measured + &row.by_measured * &self.values;
-        measured - self.orientation * (row.predicted + &row.jacobian * &self.values)
+    /// All unknowns as differences from their priors.
+    fn differences(at: &FitEstimate) -> DVector<f64> {
+        let mut differences = at.values.clone();
+        differences.fixed_rows_mut::<3>(0).copy_from(&so3::log(&at.orientation));
+        differences
     }
 
-    /// Covariance of a residual, in the frame of the measured rotation.
-    fn covariance(&self, row: &Row) -> Matrix3<f64> {
-        let rotation = self.orientation.to_rotation_matrix().into_inner();
-        rotation * row.covariance * rotation.transpose()
-    }
-
-    /// Squared residual in units of its covariance: χ² with three degrees of freedom.
-    fn square(&self, row: &Row) -> Option<f64> {
-        let residual = self.residual(row);
-        Some(residual.dot(&self.covariance(row).cholesky()?.solve(&residual)))
-    }
-
-    /// One iteration of reweighted least squares; returns the covariance of the columns.
-    fn update(&mut self) -> Option<DMatrix<f64>> {
-        let mut information = DMatrix::from_diagonal(&self.prior_information);
-        let mut gradient = -self.prior_information.component_mul(&self.values);
-        let mut of_orientation = gradient.fixed_rows_mut::<3>(0);
-        of_orientation -= self.prior_information.fixed_rows::<3>(0).component_mul(&so3::log(&self.orientation));
-        let rotation = self.orientation.to_rotation_matrix().into_inner();
-        let largest = 3.0 * mean_square_quantile(3.0, SIGNIFICANT_SIGMAS);
-        for row in &self.rows {
-            // Decreases with the square of the misfit beyond what noise explains.
-            let weight = (largest / self.square(row)?.max(f64::MIN_POSITIVE)).min(1.0);
-            let jacobian = rotation * &row.jacobian - &row.by_measured;
-            let weighted = self.covariance(row).cholesky()?.inverse() * weight;
-            information += jacobian.transpose() * weighted * &jacobian;
-            gradient += jacobian.transpose() * (weighted * self.residual(row));
-        }
-        let factor = information.cholesky()?;
-        let mut step = factor.solve(&gradient);
-        self.orientation *= so3::exp(&step.fixed_rows::<3>(0).into_owned());
-        step.fixed_rows_mut::<3>(0).fill(0.0);
-        self.values += step;
-        Some(factor.inverse())
-    }
-
-    fn finish(self, covariance: &DMatrix<f64>, spread: f64) -> RotationFit {
-        let squares: Vec<f64> = self.rows.iter().filter_map(|row| self.square(row)).collect();
+    /// Result at the solution; `None` if the rotations do not constrain it.
+    fn finish(&self, at: &FitEstimate, spread: f64) -> Option<RotationFit> {
+        let rows = &self.rows;
+        let covariance = self.linearize(at).hessian.cholesky()?.inverse();
+        let squares: Vec<f64> = rows.iter().filter_map(|row| row.square(at)).collect();
         let mean_square = percentile(&squares, COMPARED_QUANTILE) / (3.0 * mean_square_quantile(3.0, COMPARED_SIGMAS));
-        let degrees_of_freedom = (3 * self.rows.len()).saturating_sub(CHAIN).max(1);
-        let norms: Vec<f64> = self.rows.iter().map(|row| self.residual(row).norm()).collect();
-        let predicted: Vec<f64> =
-            self.rows.iter().map(|row| MEDIAN_NORM_RATIO * row.covariance.trace().sqrt()).collect();
-        let extra = self.values.rows(self.values.len() - self.extra, self.extra).iter().copied().collect();
+        let degrees_of_freedom = (3 * rows.len()).saturating_sub(CHAIN).max(1);
+        let norms: Vec<f64> = rows.iter().map(|row| row.residual(at).norm()).collect();
+        let predicted: Vec<f64> = rows.iter().map(|row| MEDIAN_NORM_RATIO * row.covariance.trace().sqrt()).collect();
+        let extra = at.values.rows(at.values.len() - self.extra, self.extra).iter().copied().collect();
         let of_orientation = covariance.fixed_view::<3, 3>(0, 0).into_owned().symmetric_eigenvalues();
-        RotationFit {
-            orientation: self.orientation,
+        Some(RotationFit {
+            orientation: at.orientation,
             orientation_sigma_rad: (of_orientation.max() * mean_square.max(1.0)).sqrt(),
-            scale: 1.0 + self.values[SCALE],
+            scale: 1.0 + at.values[SCALE],
             spread,
             misfit_rad: median(&norms),
-            misfits_rad: self.rows.iter().map(|row| row.middle_s).zip(norms).collect(),
+            misfits_rad: rows.iter().map(|row| row.middle_s).zip(norms).collect(),
             predicted_misfit_rad: median(&predicted),
             mean_square,
             degrees_of_freedom,
             extra,
-            deviance: deviance(&squares) + self.rows.iter().map(|row| row.log_noise_ratio).sum::<f64>(),
+            deviance: deviance(&squares) + rows.iter().map(|row| row.log_noise_ratio).sum::<f64>(),
+        })
+    }
+}
+
+impl Row {
+    /// Rotation vector before the fitted orientation is applied.
+    fn corrected(&self, at: &FitEstimate) -> Vector3<f64> {
+        self.predicted + &self.jacobian * &at.values
+    }
+
+    fn residual(&self, at: &FitEstimate) -> Vector3<f64> {
+        self.measured + &self.by_measured * &at.values - at.orientation * self.corrected(at)
+    }
+
+    /// Covariance of the residual, in the frame of the measured rotation.
+    fn covariance_in_camera(&self, at: &FitEstimate) -> Matrix3<f64> {
+        let rotation = at.orientation.to_rotation_matrix().into_inner();
+        rotation * self.covariance * rotation.transpose()
+    }
+
+    /// Squared residual in units of its covariance: χ² with three degrees of freedom.
+    fn square(&self, at: &FitEstimate) -> Option<f64> {
+        let residual = self.residual(at);
+        Some(residual.dot(&self.covariance_in_camera(at).cholesky()?.solve(&residual)))
+    }
+}
+
+impl LeastSquares for FitProblem {
+    type Estimate = FitEstimate;
+    type Equations = NormalEquations<Dyn>;
+
+    fn cost(&self, at: &FitEstimate) -> f64 {
+        let largest = self.largest_square;
+        let loss = |row: &Row| match row.square(at) {
+            Some(square) if square <= largest => square,
+            Some(square) => largest * (1.0 + (square / largest).ln()),
+            None => f64::INFINITY,
+        };
+        let of_prior = self.prior_information.dot(&Self::differences(at).map(|value| value * value));
+        self.rows.iter().map(loss).sum::<f64>() + of_prior
+    }
+
+    fn linearize(&self, at: &FitEstimate) -> NormalEquations<Dyn> {
+        let hessian = DMatrix::from_diagonal(&self.prior_information);
+        let gradient = self.prior_information.component_mul(&Self::differences(at));
+        let mut equations = NormalEquations { hessian, gradient };
+        let rotation = at.orientation.to_rotation_matrix().into_inner();
+        for row in &self.rows {
+            let (Some(square), Some(factor)) = (row.square(at), row.covariance_in_camera(at).cholesky()) else {
+                continue;
+            };
+            let mut jacobian = row.jacobian.clone();
+            jacobian.fixed_columns_mut::<3>(0).copy_from(&-so3::hat(&row.corrected(at)));
+            // Derivative of the prediction less the measurement.
+            let jacobian = rotation * jacobian - &row.by_measured;
+            let lower = factor.l();
+            let whitened = (lower.solve_lower_triangular(&-row.residual(at)), lower.solve_lower_triangular(&jacobian));
+            if let (Some(residual), Some(jacobian)) = whitened {
+                equations.add(&residual, &jacobian, (self.largest_square / square.max(f64::MIN_POSITIVE)).min(1.0));
+            }
         }
+        equations
+    }
+
+    fn plus(&self, at: &FitEstimate, step: &DVector<f64>) -> FitEstimate {
+        let mut values = &at.values + step;
+        values.fixed_rows_mut::<3>(0).fill(0.0);
+        let orientation = so3::plus(&at.orientation, &step.fixed_rows::<3>(0).into_owned());
+        FitEstimate { orientation, values }
     }
 }
 
