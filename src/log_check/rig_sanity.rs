@@ -1,15 +1,34 @@
 use nalgebra::Vector2;
 
+use super::extrinsics::MAX_LEVER_M;
 use super::report::{Area, CheckReport, Finding, Findings, Severity};
 use crate::camera::{CameraModel, Projection};
 use crate::flight_log::FlightLog;
 use crate::sensors::{AssumedField, CameraRig, ChainPrior, GimbalRig, Rig};
 
-/// A camera farther from the IMU than this is unusual on a drone.
-const MAX_LEVER_M: f64 = 1.0;
 /// Smallest reported difference between a pixel by the log's `CameraInfo` and by the rig, as a ratio of the focal
 /// length.
 const INTRINSICS_TOLERANCE: f64 = 0.02;
+/// Cells of the grid of directions along a side of the image.
+const CELLS: u32 = 8;
+/// Distance of the principal point from the image centre, as a ratio of half the side, that is reported.
+const FAR_CENTRE: f64 = 0.25;
+/// The same distance for an error.
+const WRONG_CENTRE: f64 = 0.4;
+/// Relative difference of the distances along both sides up to which the intrinsics belong to an image of another size.
+const SAME_SCALE: f64 = 0.1;
+/// Ratios of the focal lengths of nearly square pixels.
+const SQUARE_PIXELS: std::ops::RangeInclusive<f64> = 0.9..=1.1;
+/// Usual fields of view, in degrees.
+const USUAL_FIELD_DEG: std::ops::RangeInclusive<f64> = 25.0..=200.0;
+/// Distance of the checked pixels from the border, as a ratio of the side.
+const BORDER: f64 = 0.05;
+/// Factor on the pixels of the corners that leaves this distance on both sides.
+const INNER: f64 = 0.9;
+/// Wide prior of the lengths of a chain.
+const WIDE_PRIOR_M: f64 = 0.1;
+/// Wide prior of the angles of a chain.
+const WIDE_PRIOR_RAD: f64 = 0.35;
 
 impl CheckReport {
     /// Adds a note about keys in the rig's file that are written by other programs and not used here.
@@ -93,18 +112,18 @@ fn check_lens(camera: &CameraRig, findings: &mut Findings) {
     let before = findings.list.len();
     let numbers = format!("fx {fx:.1}, fy {fy:.1}, cx {cx:.1}, cy {cy:.1} at {width:.0}×{height:.0}");
     let off = centre.map(|ratio| (ratio - 1.0).abs());
-    if off[0].max(off[1]) > 0.25 {
+    if off[0].max(off[1]) > FAR_CENTRE {
         let scale = 0.5 * (centre[0] + centre[1]);
-        let remedy = if (centre[0] - centre[1]).abs() < 0.1 * scale {
+        let remedy = if (centre[0] - centre[1]).abs() < SAME_SCALE * scale {
             format!("the intrinsics fit an image {scale:.2} times as large: scale them, or set resolution")
         } else {
             "check the order fx fy cx cy, and that resolution is [width, height]".to_owned()
         };
         let title = format!("the principal point of {} is far from the image centre", camera.key);
-        let severity = if off[0].max(off[1]) > 0.4 { Severity::Error } else { Severity::Warning };
+        let severity = if off[0].max(off[1]) > WRONG_CENTRE { Severity::Error } else { Severity::Warning };
         findings.add(severity, Area::Intrinsics, title, numbers.clone(), remedy);
     }
-    if !(0.9..=1.1).contains(&(fx / fy)) && model.projection == Projection::Pinhole {
+    if !SQUARE_PIXELS.contains(&(fx / fy)) && model.projection == Projection::Pinhole {
         let title = format!("the focal lengths of {} differ", camera.key);
         let remedy = "pixels are nearly always square: calibrate again, or check how the image was resized";
         findings.add(Severity::Warning, Area::Intrinsics, title, numbers.clone(), remedy);
@@ -116,7 +135,7 @@ fn check_lens(camera: &CameraRig, findings: &mut Findings) {
         findings.add(Severity::Warning, Area::Intrinsics, title, evidence, remedy);
         return;
     };
-    if !(25.0..=200.0).contains(&fov_deg) {
+    if !USUAL_FIELD_DEG.contains(&fov_deg) {
         let title = format!("the field of view of {} is unusual", camera.key);
         let evidence = format!("{fov_deg:.0}° across; {numbers}");
         let remedy = "check that fx and fy are in pixels, and the camera model";
@@ -134,7 +153,7 @@ fn field_of_view_deg(model: &CameraModel) -> Option<f64> {
     let [width, height] = model.resolution_px.map(|side| side as f64);
     let direction = |u: f64, v: f64| model.unproject(&Vector2::new(u, v));
     for corner in [(0.0, 0.0), (width - 1.0, 0.0), (0.0, height - 1.0), (width - 1.0, height - 1.0)] {
-        let inside = (0.9 * corner.0 + 0.05 * width, 0.9 * corner.1 + 0.05 * height);
+        let inside = (INNER * corner.0 + BORDER * width, INNER * corner.1 + BORDER * height);
         direction(inside.0, inside.1)?;
     }
     let [_, _, cx, cy] = model.intrinsics_px;
@@ -186,7 +205,6 @@ fn in_tenths(intrinsics_px: [f64; 4]) -> String {
 /// Largest distance between the pixels of one direction in two cameras, in pixels, and the pixel in the first one.
 /// Directions are taken on a grid over the first camera's image, where both cameras see them.
 fn largest_pixel_difference(camera: &CameraModel, other: &CameraModel) -> (f64, Vector2<f64>) {
-    const CELLS: u32 = 8;
     let [width, height] = camera.resolution_px.map(|side| side as f64 - 1.0);
     let grid = (0..=CELLS).flat_map(|row| (0..=CELLS).map(move |column| (column, row)));
     let at = |step: u32, side: f64| side * f64::from(step) / f64::from(CELLS);
@@ -220,7 +238,7 @@ fn check_chain(gimbal: &GimbalRig, findings: &mut Findings) {
     if translation_bound_m == 0.0 || rotation_bound_rad == 0.0 {
         let remedy = "set gimbal.prior to the errors that the chain may have; zero keeps it fixed";
         findings.add(Severity::Note, Area::Extrinsics, "the prior of the chain is zero: it is fixed", evidence, remedy);
-    } else if translation_bound_m > 0.1 || rotation_bound_rad > 0.35 {
+    } else if translation_bound_m > WIDE_PRIOR_M || rotation_bound_rad > WIDE_PRIOR_RAD {
         let remedy = "measure the gimbal better: with a wide prior the chain can diverge in the first seconds";
         findings.add(Severity::Note, Area::Extrinsics, "the prior of the chain is wide", evidence, remedy);
     } else {

@@ -2,9 +2,19 @@
 
 use crate::geometry::{self, wrap_angle};
 
+/// Number of standard deviations from which a deviation is reported: 0.3 % of sound values exceed it.
+pub(super) const SIGNIFICANT_SIGMAS: f64 = 3.0;
+/// Median magnitude of a normal number, in standard deviations.
+const MEDIAN_PER_SIGMA: f64 = 0.6745;
+
 /// Quantile at `fraction` (0 to 1) of the values, nearest rank; 0 without values.
 pub(super) fn percentile(values: &[f64], fraction: f64) -> f64 {
     geometry::quantile(values, fraction).unwrap_or(0.0)
+}
+
+/// Length of the range of the middle 80 % of the values.
+pub(super) fn middle_range(values: &[f64]) -> f64 {
+    percentile(values, 0.9) - percentile(values, 0.1)
 }
 
 /// Median; 0 without values.
@@ -34,6 +44,6 @@ pub(super) fn white_sigma(values: &[f64], wraps: bool) -> f64 {
         .windows(3)
         .map(|three| (difference(three[1], three[2]) - difference(three[0], three[1])).abs())
         .collect();
-    // The median of |x| for a normal x is 0.6745 of its standard deviation.
-    percentile(&second, 0.5) / 0.6745 / 6.0_f64.sqrt()
+    // A second difference has six times the variance of a reading.
+    percentile(&second, 0.5) / MEDIAN_PER_SIGMA / 6.0_f64.sqrt()
 }

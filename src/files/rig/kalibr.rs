@@ -50,7 +50,7 @@ pub(crate) fn read_camera_chain(
     }
     Ok(Rig {
         name: name.to_owned(),
-        gravity_m_per_s2: read::STANDARD_GRAVITY_M_PER_S2,
+        gravity_m_per_s2: read::USUAL_GRAVITY_M_PER_S2,
         imu,
         gimbal_imu: None,
         cameras,

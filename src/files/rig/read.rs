@@ -20,16 +20,16 @@ const MAX_LINKS: usize = 16;
 const MAX_CAMERAS: usize = 16;
 /// Largest number of assumed fields of a rig.
 const MAX_ASSUMED: usize = 256;
-/// Gravity for Kalibr's files, which do not contain it, in m/s².
-pub(crate) const STANDARD_GRAVITY_M_PER_S2: f64 = 9.81;
+/// Gravity where no rig states it, as in Kalibr's files, in m/s².
+pub(crate) const USUAL_GRAVITY_M_PER_S2: f64 = 9.81;
 
 /// A joint limit beyond two revolutions is an angle in degrees.
-const MAX_LIMIT_RAD: f64 = 2.0 * std::f64::consts::TAU;
+pub(crate) const MAX_LIMIT_RAD: f64 = 2.0 * std::f64::consts::TAU;
 /// An encoder with a larger standard deviation measures nothing; values of 0.5 to 1 are usually degrees.
 const MAX_SIGMA_RAD: f64 = 0.5;
 
 /// A larger time offset means that a clock was never set; the largest of a clock that is set is 37 s, of TAI to UTC.
-const MAX_TIMESHIFT_S: f64 = 60.0;
+pub(crate) const MAX_TIMESHIFT_S: f64 = 60.0;
 
 /// Reads a rig in the schema of this program.
 pub(crate) fn read_rig(root: &Field<'_>, default_name: &str, facts: &dyn CameraFacts) -> Result<Rig, FileError> {

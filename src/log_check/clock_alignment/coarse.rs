@@ -8,6 +8,7 @@ const STEP_S: f64 = 0.01;
 /// Ratio by which an image speed may exceed the largest reference speed: a wrong focal length scales the speeds of
 /// images.
 const SPEED_MARGIN: f64 = 1.5;
+/// Most offsets that are refined.
 const PEAKS: usize = 24;
 
 /// Correlation of the angular speeds at one offset.

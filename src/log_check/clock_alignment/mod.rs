@@ -19,6 +19,7 @@ pub use self::references::{AlignmentReference, align_camera};
 pub(super) use self::refinement::BIAS_SIGMA_RAD_PER_S;
 pub use self::refinement::ClockAlignment;
 use self::refinement::Refined;
+pub(super) use self::refinement::SCALE_SIGMA;
 pub use self::series::RotationReference;
 use self::series::{DISTINCT_S, MIN_ROTATIONS, PairRotation};
 use super::report::ImageRotation;
@@ -36,6 +37,14 @@ const MIN_DISTINCTION: f64 = 1.5;
 const NOISY_LENGTHS_S: [f64; 2] = [0.3, 0.6];
 /// An image rotation is an outlier if it differs from its neighbours by this many times the median.
 const OUTLIER_RATIO: f64 = 8.0;
+
+/// Smallest reported time offset of a camera: a twelfth of the image interval at 20 Hz; rolling shutter and exposure shift
+/// stamps by less.
+pub(super) const OFFSET_TOLERANCE_S: f64 = 0.004;
+/// Tolerated error of an orientation; smaller ones are estimated.
+pub(super) const ORIENTATION_TOLERANCE_RAD: f64 = 0.07;
+/// Smallest reported error of the scale: gyroscopes and focal lengths are known to a percent.
+pub(super) const SCALE_TOLERANCE: f64 = 0.02;
 
 /// Reason that two clocks cannot be aligned.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

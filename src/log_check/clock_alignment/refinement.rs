@@ -11,11 +11,14 @@ use crate::optimization::{NormalEquations, gauss_newton};
 /// Prior standard deviation of the drift between two quartz clocks.
 const DRIFT_SIGMA: f64 = 1e-4;
 /// Prior standard deviation of the scale: a focal length from a field of view is known to some tenths.
-const SCALE_SIGMA: f64 = 0.3;
+pub(crate) const SCALE_SIGMA: f64 = 0.3;
+/// Smallest and largest scale.
+const SCALE_RANGE: [f64; 2] = [0.3, 3.0];
 /// Prior standard deviation of the gyroscope's bias: a consumer sensor has up to 5 °/s.
 pub(crate) const BIAS_SIGMA_RAD_PER_S: f64 = 0.09;
 /// Prior standard deviation of the bias of orientations, which have none.
 const NO_BIAS_SIGMA_RAD_PER_S: f64 = 1e-6;
+/// Most iterations of the least squares.
 const ITERATIONS: usize = 20;
 /// Update of the offset below which the iterations end.
 const CONVERGED_S: f64 = 1e-7;
@@ -25,6 +28,8 @@ const MAX_UPDATE_S: f64 = 0.05;
 const DIFFERENCE_S: f64 = 0.004;
 /// Huber's threshold in standard deviations.
 const HUBER: f64 = 1.345;
+/// Largest correlation of consecutive residuals; the variance then grows to 39 times its value.
+const MAX_CORRELATION: f64 = 0.95;
 /// Ratio of a normal distribution's standard deviation to the median norm of three such residuals.
 const SIGMA_PER_MEDIAN_NORM: f64 = 1.0 / 1.538;
 
@@ -184,7 +189,7 @@ impl Refined {
         self.offset_s += step[0];
         self.drift += step[1];
         self.camera_from_body = so3::plus_left(&self.camera_from_body, &Vector3::new(step[2], step[3], step[4]));
-        self.scale = (self.scale + step[5]).clamp(0.3, 3.0);
+        self.scale = (self.scale + step[5]).clamp(SCALE_RANGE[0], SCALE_RANGE[1]);
         self.bias += Vector3::new(step[6], step[7], step[8]);
         step[0]
     }
@@ -197,7 +202,7 @@ impl Refined {
         let information = self.normal_equations(rows).hessian;
         // Residuals of consecutive images may be correlated; the variance grows accordingly.
         let residuals: Vec<Vector3<f64>> = rows.iter().map(|row| self.residual(row)).collect();
-        let correlation = consecutive_correlation(&residuals, 0.95);
+        let correlation = consecutive_correlation(&residuals, MAX_CORRELATION);
         self.covariance = information.try_inverse()? * ((1.0 + correlation) / (1.0 - correlation));
         let weighted = |value: &dyn Fn(&Row) -> f64| -> f64 {
             rows.iter().map(|row| Self::weight(&self.residual(row), sigma_rad) * value(row)).sum()

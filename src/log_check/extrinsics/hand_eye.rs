@@ -8,13 +8,16 @@ use nalgebra::{UnitQuaternion, Vector3};
 use crate::faults::{Fault, FaultKind, USELESS_DELAY_S};
 use crate::geometry::{best_rotation, so3};
 use crate::gimbal::ClassicalChain;
-use crate::log_check::clock_alignment::{ClockAlignment, RotationReference, align_clocks};
+use crate::log_check::clock_alignment::{
+    ClockAlignment, OFFSET_TOLERANCE_S, ORIENTATION_TOLERANCE_RAD, RotationReference, SCALE_SIGMA, SCALE_TOLERANCE,
+    align_clocks,
+};
 use crate::log_check::imu::ImuFacts;
 use crate::log_check::report::{Area, Findings, ImageRotation, Measurement, Severity};
 use crate::log_check::rotations::data::{JOINED_S, RotationData, joined};
 use crate::log_check::rotations::fit::{FREE_ORIENTATION_RAD, FitPriors, RotationFit, RotationPair};
 use crate::log_check::rotations::hypotheses::{self, Outcome, WithinNoise};
-use crate::log_check::statistics::median;
+use crate::log_check::statistics::{SIGNIFICANT_SIGMAS, median};
 use crate::log_check::survey::Survey;
 use crate::sensors::{CameraMount, CameraRig, Rig};
 
@@ -24,27 +27,18 @@ const MIN_ROTATIONS: usize = 20;
 const MIN_ROTATION_RAD: f64 = 0.003;
 /// Largest magnitude of a time offset in the search.
 const MAX_OFFSET_S: f64 = 0.15;
-/// Smallest reported time offset: a twelfth of the image interval at 20 Hz; rolling shutter and exposure shift stamps
-/// by less.
-const OFFSET_TOLERANCE_S: f64 = 0.004;
-/// Number of standard deviations from which a time offset, an orientation error or a scale is reported.
-const SIGNIFICANT_SIGMAS: f64 = 3.0;
-/// The same for a time offset of a camera on joints: its derivatives are those of noisy images, and its standard deviation
-/// is too small by up to a third.
+/// Number of standard deviations from which a time offset of a camera on joints is reported: its derivatives come from
+/// noisy images, and its standard deviation is too small by up to a third.
 const SIGNIFICANT_SIGMAS_ON_JOINTS: f64 = 5.0;
 /// Largest standard deviation of a time offset that counts as observable.
 const MAX_OFFSET_SIGMA_S: f64 = 0.01;
-/// Tolerated error of a camera's orientation.
-const ROTATION_TOLERANCE_RAD: f64 = 0.07;
 /// A larger error means a wrong matrix, not an inaccurate one.
 const WRONG_ROTATION_RAD: f64 = 0.35;
-/// Prior standard deviation of the ratio of image rotations to predicted ones, and the smallest difference of it from 1
-/// that is traced to its cause: gyroscopes and focal lengths are known to a percent.
-const SCALE_SIGMA: f64 = 0.3;
-const SCALE_TOLERANCE: f64 = 0.02;
 /// Smallest ratio of the second singular value to the first; below it all rotations are about one axis, and the rotation
 /// about that axis is unobservable.
 const MIN_SPREAD: f64 = 0.02;
+/// Largest ratio of the misfit with an inverted transform to the misfit as in the rig with which it counts as inverted.
+const INVERTED_MISFIT: f64 = 0.5;
 
 const CALIBRATE: &str =
     "check direction and axes of the extrinsics (T_cam_imu maps from the IMU to the camera), or calibrate";
@@ -249,7 +243,7 @@ impl HandEye<'_> {
         } else if fit.spread < MIN_SPREAD {
             let title = format!("{key} rotated about one axis only: its orientation cannot be checked");
             findings.add(Severity::Note, Area::Extrinsics, title, evidence, "rotate about all axes");
-        } else if sigma_rad > ROTATION_TOLERANCE_RAD {
+        } else if sigma_rad > ORIENTATION_TOLERANCE_RAD {
             let title = format!("the rotations of {key} are predicted too inaccurately to check its orientation");
             let remedy = "noise of gyroscope or encoders is as large as the rotations: rotate faster or longer";
             findings.add(Severity::Note, Area::Extrinsics, title, evidence, remedy);
@@ -313,15 +307,15 @@ impl HandEye<'_> {
             let vectors: Vec<_> = pairs.iter().map(|pair| (pair.predicted(&chain), pair.measured)).collect();
             let (error, _) = best_rotation(&vectors)?;
             let misfit = misfit_rad(&pairs, &chain);
-            (error.angle() < ROTATION_TOLERANCE_RAD).then_some((field, misfit))
+            (error.angle() < ORIENTATION_TOLERANCE_RAD).then_some((field, misfit))
         });
-        misfits.filter(|(_, misfit)| *misfit < 0.5 * given_rad).min_by(|a, b| a.1.total_cmp(&b.1))
+        misfits.filter(|(_, misfit)| *misfit < INVERTED_MISFIT * given_rad).min_by(|a, b| a.1.total_cmp(&b.1))
     }
 }
 
 /// Smallest error of the orientation that is one, in radians.
 fn tolerance_rad(fit: &RotationFit) -> f64 {
-    ROTATION_TOLERANCE_RAD.max(SIGNIFICANT_SIGMAS * fit.orientation_sigma_rad)
+    ORIENTATION_TOLERANCE_RAD.max(SIGNIFICANT_SIGMAS * fit.orientation_sigma_rad)
 }
 
 /// State of images by which the camera seems to be rotated, camera frame (x right, y down), with the remedy; `None` for
@@ -332,7 +326,7 @@ fn turned_images(orientation: &UnitQuaternion<f64>) -> Option<(&'static str, &'s
     const MIRROR: &str = "look at text in the images: mirror them back in the driver, or correct the extrinsics, by which \
                           the camera then looks backwards";
     let about = |axis: Vector3<f64>, angle_rad: f64| {
-        so3::exp(&(axis * angle_rad)).angle_to(orientation) < ROTATION_TOLERANCE_RAD
+        so3::exp(&(axis * angle_rad)).angle_to(orientation) < ORIENTATION_TOLERANCE_RAD
     };
     let (x, y, z) = (Vector3::x(), Vector3::y(), Vector3::z());
     [

@@ -14,6 +14,15 @@ use super::survey::Survey;
 use crate::geometry::{RigidTransform, seconds_from_ns};
 use crate::sensors::{CameraMount, CameraRig, Rig};
 
+/// A camera farther from the IMU than this is unusual on a drone.
+pub(super) const MAX_LEVER_M: f64 = 1.0;
+/// Elevation of an optical axis, in degrees, beyond which it counts as vertical: its roll is then inaccurate.
+const VERTICAL_DEG: f64 = 70.0;
+/// Largest roll of an upright camera, in degrees.
+const UPRIGHT_ROLL_DEG: f64 = 45.0;
+/// Largest roll by the inverse matrix, in degrees, with which it counts as the right one.
+const INVERSE_ROLL_DEG: f64 = 30.0;
+
 /// Checks the extrinsics of all cameras; returns the rotations of the IMU, in its frame, that would explain the
 /// orientations of rigid cameras that differ from the rig.
 pub(super) fn check_rotations(
@@ -77,11 +86,10 @@ fn check_against_gravity(
          with the inverse matrix {inverse_elevation:+.0}° and {inverse_roll:+.0}°",
         seconds_from_ns(stamp_ns)
     );
-    // Roll is undefined for a vertical optical axis.
-    if elevation.abs() > 70.0 || roll.abs() < 45.0 {
+    if elevation.abs() > VERTICAL_DEG || roll.abs() < UPRIGHT_ROLL_DEG {
         return findings.good(Area::Extrinsics, format!("{} is upright", camera.key), evidence);
     }
-    let inverted = inverse_roll.abs() < 30.0 && inverse_elevation.abs() < 70.0;
+    let inverted = inverse_roll.abs() < INVERSE_ROLL_DEG && inverse_elevation.abs() < VERTICAL_DEG;
     let field = if camera.mount == CameraMount::Gimbal { "gimbal.T_I_B and T_E_C" } else { "T_cam_imu" };
     let (severity, title) = if inverted {
         (Severity::Error, format!("the extrinsics of {} appear inverted", camera.key))
@@ -95,7 +103,7 @@ fn check_against_gravity(
 fn check_lever(camera: &CameraRig, findings: &mut Findings) {
     let CameraMount::Static { imu_from_camera } = &camera.mount else { return };
     let lever_m = imu_from_camera.translation_m.norm();
-    if lever_m > 1.0 {
+    if lever_m > MAX_LEVER_M {
         let evidence = format!("{lever_m:.3} m from the IMU");
         let title = format!("{} is far from the IMU", camera.key);
         findings.add(Severity::Warning, Area::Extrinsics, title, evidence, "the translation of T_cam_imu is in metres");

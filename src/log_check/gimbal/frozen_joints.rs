@@ -13,11 +13,11 @@ use crate::sensors::{Joint, Rig};
 const FROZEN_READINGS: usize = 20;
 /// Shortest such interval in nanoseconds.
 const FROZEN_NS: i64 = 200_000_000;
-/// Smallest share of readings that differ from the one before outside of such intervals: an encoder with coarse steps
+/// Smallest ratio of readings that differ from the one before outside of such intervals: an encoder with coarse steps
 /// repeats its readings while it works.
 const MIN_CHANGING: f64 = 0.95;
-/// A reading this close to a limit, in radians, may stay equal: the joint is at its stop.
-const AT_LIMIT_RAD: f64 = 0.01;
+/// A reading this close to a limit, in radians, counts as at the limit: at its stop a joint may repeat a reading.
+pub(super) const AT_LIMIT_RAD: f64 = 0.01;
 
 /// Reports encoders whose readings always differ from the one before, except in intervals in which the vehicle rotates
 /// and they stay equal.

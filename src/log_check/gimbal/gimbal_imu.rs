@@ -3,20 +3,16 @@
 use nalgebra::Vector3;
 
 use crate::geometry::{seconds_from_ns, so3};
-use crate::log_check::clock_alignment::{RotationReference, align_clocks};
+use crate::log_check::clock_alignment::{
+    OFFSET_TOLERANCE_S, ORIENTATION_TOLERANCE_RAD, RotationReference, align_clocks,
+};
 use crate::log_check::report::{Area, Findings, ImageRotation, Measurement, Severity};
-use crate::log_check::statistics::median;
+use crate::log_check::statistics::{SIGNIFICANT_SIGMAS, median};
 use crate::log_check::survey::Survey;
 use crate::sensors::{AngularRates, CameraMount, CameraRig, GimbalImuRig, Rig};
 
 /// Largest magnitude of a time offset in the search.
 const MAX_OFFSET_S: f64 = 0.5;
-/// Smallest reported time offset: within it, a stabilized camera rotates by the noise of an image.
-const OFFSET_TOLERANCE_S: f64 = 0.004;
-/// Number of standard deviations from which a time offset is reported.
-const SIGNIFICANT_SIGMAS: f64 = 3.0;
-/// Tolerated error of the axes: `gimbal-imu-axes=on` estimates smaller ones.
-const AXES_TOLERANCE_RAD: f64 = 0.07;
 /// Tolerated ratio of the difference of the median specific force from gravity: accelerations of a flight, and a bias.
 const GRAVITY_TOLERANCE: f64 = 0.15;
 
@@ -92,12 +88,12 @@ fn check_against_images(
         error_rad.to_degrees(),
         found.scale
     );
-    if error_rad < AXES_TOLERANCE_RAD {
+    if error_rad < ORIENTATION_TOLERANCE_RAD {
         return findings.good(Area::Extrinsics, "the axes of the IMU on the gimbal agree with the rig", evidence);
     }
     let inverse_rad = imu.camera_from_imu.rotation.inverse().angle_to(&measured);
     let title = format!("the axes of the IMU on the gimbal differ from the rig by {:.0}°", error_rad.to_degrees());
-    let remedy = if inverse_rad < AXES_TOLERANCE_RAD {
+    let remedy = if inverse_rad < ORIENTATION_TOLERANCE_RAD {
         "write the inverse of imu1.T_cam_imu: it maps points from this IMU to the camera"
     } else {
         "correct the rotation of imu1.T_cam_imu: its columns are the axes of this IMU in the camera (x right, y down, z \

@@ -7,6 +7,7 @@ pub(super) mod vehicle_attitude;
 
 use std::f64::consts::{PI, TAU};
 
+use self::frozen_joints::AT_LIMIT_RAD;
 use super::report::{Area, Findings, Measurement, Severity};
 use super::statistics::{median, percentile, white_sigma};
 use super::survey::{Survey, is_in_radians};
@@ -20,8 +21,22 @@ const UNREACHABLE_RAD: f64 = 0.035;
 
 /// Range of motion over the log below which the parameters of a joint are unobservable.
 const MIN_RANGE_RAD: f64 = 0.05;
-/// A reading this close to a limit counts as at the limit.
-const AT_LIMIT_RAD: f64 = 0.01;
+/// Rotation beyond a limit that is tolerated, before the noise of the encoder.
+const LIMIT_MARGIN_RAD: f64 = 0.03;
+/// Standard deviations of an encoder within which its readings lie.
+const NOISE_SIGMAS: f64 = 4.0;
+/// Quantiles of the readings between which a joint moves.
+const MOTION_QUANTILES: [f64; 2] = [0.02, 0.98];
+/// Ratio of readings at a limit that is reported.
+const AT_LIMIT_RATIO: f64 = 0.01;
+/// Joints whose limits are closer to a whole revolution than this have no stop.
+const FREE_ROTATION_RAD: f64 = 0.1;
+/// Ratio of the measured noise of an encoder to the rig's from which the rig's is too small.
+const NOISE_TOO_SMALL: f64 = 2.0;
+/// Ratio of the same below which the rig's noise is too large.
+const NOISE_TOO_LARGE: f64 = 0.2;
+/// One unreachable attitude in this many is reported.
+const UNREACHABLE_ONE_IN: usize = 100;
 
 /// Smallest reported time without joint angles at the begin and the end of the images, in seconds.
 const MISSING_TOLERANCE_S: f64 = 0.5;
@@ -142,7 +157,7 @@ fn check_joint(
         degrees(lower),
         degrees(upper)
     );
-    let margin = 0.03 + 4.0 * sigma;
+    let margin = LIMIT_MARGIN_RAD + NOISE_SIGMAS * sigma;
     let turned = |angle: &f64| *angle - TAU * ((*angle - 0.5 * (lower + upper)) / TAU).round();
     let is_within = |angle: f64| (lower - margin..=upper + margin).contains(&angle);
     let has_turns = values.iter().all(|angle| is_within(turned(angle))) && !(is_within(low) && is_within(high));
@@ -160,7 +175,8 @@ fn check_joint(
     let values: Vec<f64> = angles.iter().map(|(_, angle)| *angle).collect();
     let white = white_sigma(&values, true);
     // The range without the noise of single readings.
-    let moved = percentile(&values, 0.98) - percentile(&values, 0.02) - 4.0 * white;
+    let [low, high] = MOTION_QUANTILES.map(|quantile| percentile(&values, quantile));
+    let moved = high - low - NOISE_SIGMAS * white;
     if moved < MIN_RANGE_RAD {
         let title = format!("'{name}' hardly moves");
         let remedy = "its static parameters are unobservable without joint motion: record with the joint moving, or keep them fixed";
@@ -171,7 +187,7 @@ fn check_joint(
     let at_limit =
         angles.iter().filter(|(_, angle)| *angle < lower + AT_LIMIT_RAD || *angle > upper - AT_LIMIT_RAD).count();
     let ratio = at_limit as f64 / angles.len() as f64;
-    if ratio > 0.01 && upper - lower < std::f64::consts::TAU - 0.1 {
+    if ratio > AT_LIMIT_RATIO && upper - lower < TAU - FREE_ROTATION_RAD {
         let first = angles.iter().find(|(_, angle)| *angle < lower + AT_LIMIT_RAD || *angle > upper - AT_LIMIT_RAD);
         let evidence = format!(
             "{:.0} % of the readings, the first at {:.1} s",
@@ -187,11 +203,11 @@ fn check_joint(
 fn compare_sigma(name: &str, measured: f64, given: f64, findings: &mut Findings) {
     let ratio = measured / given;
     let evidence = format!("white noise {:.3}°, {:.3}° in the rig", measured.to_degrees(), given.to_degrees());
-    if ratio > 2.0 {
+    if ratio > NOISE_TOO_SMALL {
         let remedy = format!("raise gimbal.encoder_sigma to {measured:.4}");
         let title = format!("encoder noise of '{name}' is {ratio:.1} times the rig's");
         findings.add(Severity::Warning, Area::Encoders, title, evidence, remedy);
-    } else if ratio < 0.2 {
+    } else if ratio < NOISE_TOO_LARGE {
         let title = format!("encoder noise of '{name}' is below the rig's");
         let remedy = "the rig's value may cover slow errors such as backlash; otherwise lower gimbal.encoder_sigma";
         findings.add(Severity::Note, Area::Encoders, title, evidence, remedy);
@@ -236,7 +252,7 @@ fn check_attitude(survey: &Survey, findings: &mut Findings) {
         seconds_from_ns(worst_ns)
     );
     let beyond = unreachable.iter().filter(|angle| **angle > UNREACHABLE_RAD).count();
-    if beyond * 100 > solved.len() {
+    if beyond * UNREACHABLE_ONE_IN > solved.len() {
         let severity = if beyond * 2 > solved.len() { Severity::Error } else { Severity::Warning };
         let title = "the joints cannot reach the recorded attitude";
         let remedy = "check frame, axes, order and unit of gimbal.source, then links and limits";

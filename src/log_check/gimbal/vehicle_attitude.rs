@@ -24,6 +24,8 @@ const STEP_SIGMAS: f64 = 8.0;
 const MIN_INTERVALS: usize = 40;
 /// Minimum median rotation over [`STEP_NS`] with which the axes are found.
 const MIN_ROTATION_RAD: f64 = 0.01;
+/// Rotations whose misfit exceeds the median by this factor are not used for the axes.
+const OUTLIER_RATIO: f64 = 3.0;
 /// Maximum number of listed steps.
 const LISTED: usize = 4;
 
@@ -137,7 +139,7 @@ fn axes(pairs: &[(Vector3<f64>, Vector3<f64>)]) -> Option<UnitQuaternion<f64>> {
     }
     let (first, _) = best_rotation(pairs)?;
     let misfits: Vec<f64> = pairs.iter().map(|(of_imu, of_vehicle)| (of_vehicle - first * of_imu).norm()).collect();
-    let limit = 3.0 * median(&misfits);
+    let limit = OUTLIER_RATIO * median(&misfits);
     let kept: Vec<_> = pairs.iter().zip(&misfits).filter(|(_, misfit)| **misfit <= limit).map(|(it, _)| *it).collect();
     Some(best_rotation(&kept)?.0)
 }

@@ -6,8 +6,10 @@ mod placed_forces;
 use nalgebra::{UnitQuaternion, Vector3};
 
 use self::placed_forces::{PlacedForces, velocity_at};
-use super::clock_alignment::{AlignmentError, ClockAlignment, RotationReference, align_clocks};
-use super::imu::ImuFacts;
+use super::clock_alignment::{
+    AlignmentError, ClockAlignment, ORIENTATION_TOLERANCE_RAD, RotationReference, SCALE_TOLERANCE, align_clocks,
+};
+use super::imu::{ImuFacts, LARGEST_BIAS_M_PER_S2};
 use super::report::{Area, Findings, ImageRotation, Measurement, Severity};
 use super::statistics::median;
 use crate::faults::{Fault, FaultKind};
@@ -17,8 +19,9 @@ use crate::flight_log::{FlightLog, RecordedPose};
 use crate::geometry::{RigidTransform, SignedAxes, ns_from_seconds, seconds_from_ns, so3};
 use crate::sensors::Rig;
 
-/// Step between the compared orientations in nanoseconds; poses farther apart than three steps are not compared.
+/// Step between the compared orientations in nanoseconds.
 const STEP_NS: i64 = 100_000_000;
+/// Poses farther apart are not compared, in nanoseconds.
 const MAX_STEP_NS: i64 = 3 * STEP_NS;
 /// Largest magnitude of a time offset in the search.
 const MAX_OFFSET_S: f64 = 1.0;
@@ -26,9 +29,7 @@ const MAX_OFFSET_S: f64 = 1.0;
 const OFFSET_TOLERANCE_S: f64 = 0.005;
 /// Smallest reported rotation between the body of the ground truth and the IMU, in radians.
 const BODY_TOLERANCE_RAD: f64 = 0.02;
-/// Smallest reported relative difference between the rotations of ground truth and gyroscope.
-const SCALE_TOLERANCE: f64 = 0.02;
-/// Ratio of the misfit to that with reversed rates from which the gyroscope's frame counts as left-handed.
+/// Ratio of the misfit to the misfit with reversed rates from which the gyroscope's frame counts as left-handed.
 const REVERSED_RATIO: f64 = 4.0;
 /// Ratio of the misfit to the rotations above which nothing is concluded from the alignment.
 const UNEXPLAINED_RATIO: f64 = 0.2;
@@ -39,10 +40,8 @@ const SIGNIFICANT_SIGMAS: f64 = 4.0;
 const TILT_TOLERANCE_RAD: f64 = 0.087;
 /// A larger angle means other axes, not an inaccurate levelling.
 const OTHER_AXES_RAD: f64 = 1.0;
-/// Largest difference of rotations that count as the same, in radians.
-const SAME_TURN_RAD: f64 = 0.07;
-/// Accelerometer bias in m/s² that the angle to gravity tolerates.
-const ACCELEROMETER_BIAS: f64 = 0.3;
+/// Shortest time over which a mean specific force is compared with the vertical, in seconds.
+const MIN_DURATION_S: f64 = 1.0;
 
 /// Poses of the ground truth on the log's clock, ordered by stamp.
 struct GroundTruth<'a> {
@@ -184,7 +183,7 @@ impl GroundTruth<'_> {
             tilt_rad.to_degrees(),
             acceleration.norm()
         );
-        let tolerance_rad = TILT_TOLERANCE_RAD.max(ACCELEROMETER_BIAS / vertical.norm().max(1.0));
+        let tolerance_rad = TILT_TOLERANCE_RAD.max(LARGEST_BIAS_M_PER_S2 / vertical.norm().max(1.0));
         if tilt_rad < tolerance_rad {
             return findings.good(Area::Log, "the world of the ground truth has z up", evidence);
         }
@@ -222,7 +221,7 @@ impl GroundTruth<'_> {
         });
         let duration_s = seconds_from_ns(last - first);
         let change = velocity_at(&self.poses, last)? - velocity_at(&self.poses, first)?;
-        (duration_s > 1.0).then(|| (integral / duration_s, change / duration_s))
+        (duration_s > MIN_DURATION_S).then(|| (integral / duration_s, change / duration_s))
     }
 }
 
@@ -278,7 +277,7 @@ fn report_body(found: &ClockAlignment, turns_of_imu: &[UnitQuaternion<f64>], fin
             vector.x, vector.y, vector.z
         );
         let turned = format!("rotated by {:.1}°", angle_rad.to_degrees());
-        let is_same = |turn: &UnitQuaternion<f64>| turn.angle_to(&body_from_imu) < SAME_TURN_RAD;
+        let is_same = |turn: &UnitQuaternion<f64>| turn.angle_to(&body_from_imu) < ORIENTATION_TOLERANCE_RAD;
         if !turns_of_imu.is_empty() && turns_of_imu.iter().all(is_same) {
             let title = format!("the axes of the IMU are not those of the rig: {turned}");
             let evidence = format!("ground truth and cameras agree with each other: {evidence}");

@@ -13,7 +13,7 @@ use crate::sensors::ImuSample;
 const HALF_VELOCITY_NS: i64 = 100_000_000;
 /// Minimum number of windows.
 const MIN_WINDOWS: usize = 20;
-/// Largest variance that the best axes leave, as a ratio of that of the accelerations.
+/// Largest variance that the best axes leave, as a ratio of the variance of the accelerations.
 const LARGEST_REMAINDER: f64 = 0.25;
 
 /// Poses of the ground truth with the specific forces of the IMU.

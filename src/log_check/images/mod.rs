@@ -17,6 +17,28 @@ use crate::sensors::{CameraMount, CameraRig, Rig};
 const BLURRED: f64 = 0.5;
 /// Ratio of pixels with texture below which an image gives few features.
 const MIN_TEXTURE: f64 = 0.01;
+/// Edge gradient of the median image, in grey levels per pixel, below which all images are blurred.
+const MIN_EDGE: f64 = 8.0;
+/// Blurred images, or images with little texture, are reported from one in this many.
+const POOR_ONE_IN: usize = 20;
+/// Changes of the exposure are reported above one in this many images.
+const JUMP_ONE_IN: usize = 10;
+/// Change of the mean grey value between two sampled images that is a jump of the exposure.
+const JUMP_GREY: f64 = 40.0;
+/// Mean grey values of the median image of an exposed camera.
+const EXPOSED_GREY: [f64; 2] = [25.0, 230.0];
+/// Ratio of black pixels in the median image above which a camera is underexposed.
+const MOST_DARK: f64 = 0.5;
+/// Ratio of white pixels in the median image above which a camera is overexposed.
+const MOST_BRIGHT: f64 = 0.3;
+/// Difference of the ratios of both sides to the rig's up to which an image is a scaled one.
+const SAME_SCALE: f64 = 0.01;
+/// Quantile of the angular rates that counts as fast.
+const FAST_QUANTILE: f64 = 0.99;
+/// Image motion by rotation, as a ratio of the width, that is fast for a tracker.
+const FAST_MOTION: f64 = 0.15;
+/// Maximum number of listed times of blurred images.
+const LISTED_TIMES: usize = 5;
 
 /// Number of messages of a video that are decoded: about a minute at 30 Hz.
 const DECODED_MESSAGES: usize = 2000;
@@ -77,7 +99,7 @@ fn check_size(log: &FlightLog, camera: &CameraRig, images: &[SampledImage], find
     let scale = image_width as f64 / width as f64;
     let remedy = if let Some(remedy) = window_remedy(log, camera, other.measure.resolution_px) {
         remedy
-    } else if (image_height as f64 / height as f64 - scale).abs() < 0.01 {
+    } else if (image_height as f64 / height as f64 - scale).abs() < SAME_SCALE {
         format!("the images are scaled by {scale:.3}: scale fx fy cx cy with them, or record the calibrated size")
     } else {
         "set resolution with its intrinsics; images of another size are skipped".to_owned()
@@ -116,13 +138,16 @@ fn check_blur(camera: &CameraRig, images: &[SampledImage], findings: &mut Findin
         percentile(&edges, 0.0),
         images.len()
     );
-    if usual < 8.0 {
+    if usual < MIN_EDGE {
         let title = format!("all images of {} are blurred", camera.key);
         let remedy = "check focus, compression and lens; features need edges";
         findings.add(Severity::Warning, Area::Images, title, evidence, remedy);
-    } else if blurred.len() * 20 >= images.len() {
-        let times: Vec<String> =
-            blurred.iter().take(5).map(|image| format!("{:.1} s", seconds_from_ns(image.stamp_ns))).collect();
+    } else if blurred.len() * POOR_ONE_IN >= images.len() {
+        let times: Vec<String> = blurred
+            .iter()
+            .take(LISTED_TIMES)
+            .map(|image| format!("{:.1} s", seconds_from_ns(image.stamp_ns)))
+            .collect();
         let title = format!("some images of {} are blurred", camera.key);
         let evidence = format!("{} of {} images, at {}; {evidence}", blurred.len(), images.len(), times.join(", "));
         let remedy = "shorten the exposure, add light or rotate more slowly; tracks are lost there";
@@ -143,17 +168,16 @@ fn check_exposure(camera: &CameraRig, images: &[SampledImage], findings: &mut Fi
         median(&dark) * 100.0,
         median(&bright) * 100.0
     );
-    let jumps = images.windows(2).filter(|pair| (pair[0].measure.mean_grey - pair[1].measure.mean_grey).abs() > 40.0);
-    let jumps = jumps.count();
-    if median(&grey) < 25.0 || median(&dark) > 0.5 {
+    let jumps = grey.windows(2).filter(|pair| (pair[0] - pair[1]).abs() > JUMP_GREY).count();
+    if median(&grey) < EXPOSED_GREY[0] || median(&dark) > MOST_DARK {
         let title = format!("{} is underexposed", camera.key);
         findings.add(Severity::Warning, Area::Images, title, evidence, "expose longer or raise the gain");
-    } else if median(&grey) > 230.0 || median(&bright) > 0.3 {
+    } else if median(&grey) > EXPOSED_GREY[1] || median(&bright) > MOST_BRIGHT {
         let title = format!("{} is overexposed", camera.key);
         findings.add(Severity::Warning, Area::Images, title, evidence, "expose shorter");
-    } else if jumps * 10 > images.len() {
+    } else if jumps * JUMP_ONE_IN > images.len() {
         let title = format!("the exposure of {} jumps", camera.key);
-        let evidence = format!("{jumps} changes by more than 40 grey values; {evidence}");
+        let evidence = format!("{jumps} changes by more than {JUMP_GREY} grey values; {evidence}");
         let remedy = "fix the exposure, or limit its rate of change: the tracker assumes constant brightness";
         findings.add(Severity::Note, Area::Images, title, evidence, remedy);
     } else {
@@ -169,7 +193,7 @@ fn check_texture(camera: &CameraRig, images: &[SampledImage], findings: &mut Fin
         median(&ratios) * 100.0,
         percentile(&ratios, 0.0) * 100.0
     );
-    if poor * 20 >= images.len() {
+    if poor * POOR_ONE_IN >= images.len() {
         let title = format!("some images of {} have little texture", camera.key);
         let evidence = format!("{poor} of {} images; {evidence}", images.len());
         let remedy = "white walls, sky and fog give few features: expect the estimate to drift there";
@@ -188,12 +212,12 @@ fn check_motion(camera: &CameraRig, imu_facts: &ImuFacts, findings: &mut Finding
     let rates: Vec<f64> =
         imu_facts.samples.iter().map(|sample| (sample.angular_velocity_rad_per_s - bias).norm()).collect();
     let pixels = |rate: f64| rate / camera.rate_hz * camera.model.focal_length_px();
-    let (usual, fast) = (pixels(median(&rates)), pixels(percentile(&rates, 0.99)));
+    let (usual, fast) = (pixels(median(&rates)), pixels(percentile(&rates, FAST_QUANTILE)));
     let evidence = format!(
         "image motion by rotation: {usual:.0} px per image in the median, {fast:.0} px in the fastest 1 % ({:.2} rad/s)",
-        percentile(&rates, 0.99)
+        percentile(&rates, FAST_QUANTILE)
     );
-    if fast > 0.15 * camera.model.resolution_px[0] as f64 {
+    if fast > FAST_MOTION * camera.model.resolution_px[0] as f64 {
         let title = format!("high angular rate of {}", camera.key);
         let remedy = "tracking depends on the gyroscope's prediction: extrinsics and time offset must be correct";
         findings.add(Severity::Note, Area::Motion, title, evidence, remedy);

@@ -1,4 +1,4 @@
-//! Axes of the accelerometer against those of the gyroscope: while the IMU rotates, gravity must rotate the other way in
+//! Axes of the accelerometer against the axes of the gyroscope: while the IMU rotates, gravity must rotate the other way in
 //! its frame. Exchanged or reversed axes of one sensor, or of both, show as a specific force that does not stay vertical.
 
 use nalgebra::Vector3;
@@ -11,6 +11,8 @@ use crate::sensors::ImuSample;
 
 /// Length over which specific forces are averaged, in nanoseconds.
 pub(crate) const WINDOW_NS: i64 = 250_000_000;
+/// Minimum number of such windows.
+const MIN_WINDOWS: usize = 12;
 /// Length of the pieces in which the vertical is constant, in seconds: errors of the gyroscope's bias add up.
 const PIECE_S: f64 = 10.0;
 /// Windows whose accelerations count as one measurement.
@@ -48,7 +50,7 @@ pub(crate) fn check_imu_axes(imu_facts: &ImuFacts, findings: &mut Findings) {
     let windows = windows(&imu_facts.samples);
     let square = windows.iter().map(|(_, force)| force.norm_squared()).sum::<f64>() / windows.len().max(1) as f64;
     let tilt = scatter(&windows) / square;
-    if windows.len() < 12 || tilt.is_nan() || tilt < MIN_TILT {
+    if windows.len() < MIN_WINDOWS || tilt.is_nan() || tilt < MIN_TILT {
         return;
     }
     let mut all = Vec::new();

@@ -11,9 +11,10 @@ use self::spectrum::{Spectrum, check_noise};
 use self::stationary::{Stamped, StationaryTest, WINDOW_NS, Window};
 use self::unmeasured::check_unmeasured;
 use super::report::{Area, Findings, Measurement, Severity};
-use super::statistics::{median, percentile};
+use super::statistics::{median, middle_range};
 use super::survey::Survey;
 use crate::faults::{Fault, FaultKind};
+use crate::files::rig::read::USUAL_GRAVITY_M_PER_S2;
 use crate::geometry::{mean, seconds_from_ns};
 use crate::sensors::{AngularRates, ImuSample, Rig};
 
@@ -23,9 +24,38 @@ const NO_FORCE_M_PER_S2: f64 = 0.01;
 const NO_GRAVITY_RATIO: f64 = 0.3;
 /// Factors by which a wrong range setting changes measurements.
 const RANGE_FACTORS: [f64; 4] = [0.25, 0.5, 2.0, 4.0];
-/// Relative error of such a factor, and bias of an accelerometer, in m/s², within which the factor counts as found.
+/// Relative error of such a factor within which it counts as found.
 const RANGE_TOLERANCE: f64 = 0.03;
-const LARGEST_BIAS_M_PER_S2: f64 = 0.3;
+/// Bias of an accelerometer that is tolerated.
+pub(super) const LARGEST_BIAS_M_PER_S2: f64 = 0.3;
+/// Gravities of a rig that are usual, in m/s²: on the ground it lies between 9.78 and 9.83.
+const USUAL_GRAVITIES: std::ops::RangeInclusive<f64> = 9.75..=9.85;
+/// Size of the unit g, in m/s².
+const STANDARD_GRAVITY: f64 = 9.806_65;
+/// Difference of a norm from 1 within which it is gravity in g.
+const UNIT_TOLERANCE: f64 = 0.2;
+/// Differences of the measured norm from gravity, in m/s², from which they are noted, a warning and an error.
+const GRAVITY_TOLERANCES: [f64; 3] = [0.2, 1.0, 2.0];
+/// Largest range of the middle 80 % of the norms, as a ratio of their median, of forces that contain gravity.
+const STEADY_RANGE: f64 = 0.5;
+/// Bias of a gyroscope that is noted.
+const LARGE_BIAS_RAD_PER_S: f64 = 0.03;
+/// Minimum number of samples of a checked IMU.
+const MIN_SAMPLES: usize = 10;
+/// Minimum number of samples of a window.
+const MIN_WINDOW_SAMPLES: usize = 20;
+/// Minimum number of samples at the largest value that are a saturation.
+const MIN_CLIPPED: usize = 3;
+/// Smallest limits of a saturation, in rad/s and m/s²: smaller largest values are chance.
+const SMALLEST_LIMITS: [f64; 2] = [1.0, 12.0];
+/// Largest angular rate in rad/s: 2000 °/s, the widest range of consumer gyroscopes.
+const LARGEST_RATE_RAD_PER_S: f64 = 35.0;
+/// Repeated samples are reported above one in this many.
+const REPEATED_ONE_IN: usize = 100;
+/// Ratio of the log in which a vehicle is stationary that is a warning.
+const MOSTLY_STATIONARY: f64 = 0.5;
+/// Maximum number of listed stationary intervals.
+const LISTED: usize = 6;
 /// Longest stretch of equal samples of a driver that sends faster than the sensor measures.
 const LONGEST_REPETITION: usize = 20;
 /// Standard deviations of the smoothed angular rate (rad/s) and specific force (m/s²) of a stationary or hovering
@@ -50,12 +80,12 @@ pub(super) struct ImuFacts {
 pub(super) fn check_imu(survey: &Survey, rig: Option<&Rig>, findings: &mut Findings) -> ImuFacts {
     check_unmeasured(survey, findings);
     let samples = survey.imu.clone();
-    if samples.len() < 10 {
+    if samples.len() < MIN_SAMPLES {
         return ImuFacts { samples, ..ImuFacts::default() };
     }
     let rates: Vec<Stamped> =
         samples.iter().map(|sample| (sample.stamp_ns, sample.angular_velocity_rad_per_s)).collect();
-    // Specific forces are those of a separate accelerometer topic, if there is one: interpolation removes noise.
+    // Forces of a separate accelerometer topic are not interpolated: interpolation removes noise.
     let forces: Vec<Stamped> = if survey.accelerometer.is_empty() {
         samples.iter().map(|sample| (sample.stamp_ns, sample.specific_force_m_per_s2)).collect()
     } else {
@@ -91,7 +121,7 @@ fn windows_of(rates: &[Stamped], forces: &[Stamped], spectra: &[Option<Spectrum>
     while begin < rates.len() {
         let start_ns = rates[begin].0;
         let end = rates.partition_point(|(stamp_ns, _)| *stamp_ns < start_ns + WINDOW_NS);
-        if end - begin >= 20 && rates.len() > end {
+        if end - begin >= MIN_WINDOW_SAMPLES && rates.len() > end {
             windows.push(test.window(rates, forces, start_ns));
         }
         begin = end;
@@ -106,8 +136,8 @@ fn check_gravity(
     other_topics: &[&String],
     findings: &mut Findings,
 ) {
-    let gravity = rig.map_or(9.81, |rig| rig.gravity_m_per_s2);
-    if !(9.75..=9.85).contains(&gravity) {
+    let gravity = rig.map_or(USUAL_GRAVITY_M_PER_S2, |rig| rig.gravity_m_per_s2);
+    if !USUAL_GRAVITIES.contains(&gravity) {
         let evidence = format!("{gravity} m/s²; on the ground it lies between 9.78 and 9.83");
         findings.add(
             Severity::Warning,
@@ -148,15 +178,16 @@ fn check_gravity(
         let expected = factor * gravity;
         (measured - expected).abs() < LARGEST_BIAS_M_PER_S2.max(RANGE_TOLERANCE * expected)
     };
+    let [noted, large, unusable] = GRAVITY_TOLERANCES;
     let range_factor = RANGE_FACTORS.into_iter().find(near);
     let multiple = format!("the accelerometer measures {} times gravity", range_factor.unwrap_or(1.0));
     let is_scaled = is_steady || !stationary.is_empty();
-    let (severity, title, remedy, fault) = if (measured - 1.0).abs() < 0.2 && is_scaled {
+    let (severity, title, remedy, fault) = if (measured - 1.0).abs() < UNIT_TOLERANCE && is_scaled {
         (
             Severity::Error,
             "accelerations are in g, not m/s²",
             "multiply by 9.80665 in the driver: sensor_msgs/Imu requires m/s²",
-            Some(Fault::new(FaultKind::AccelerometerScale, &[9.806_65])),
+            Some(Fault::new(FaultKind::AccelerometerScale, &[STANDARD_GRAVITY])),
         )
     } else if measured < NO_GRAVITY_RATIO * gravity {
         (
@@ -172,16 +203,16 @@ fn check_gravity(
             "the range setting of the sensor and the scale of its driver differ: correct one of them",
             Some(Fault::new(FaultKind::AccelerometerScale, &[factor.recip()])),
         )
-    } else if difference.abs() > 2.0 {
+    } else if difference.abs() > unusable {
         (
             Severity::Error,
             "the accelerometer does not measure gravity",
             "check units, scale and IMU intrinsics in the driver: while stationary the norm must be gravity",
             None,
         )
-    } else if difference.abs() > 0.2 && !stationary.is_empty() {
+    } else if difference.abs() > noted && !stationary.is_empty() {
         (
-            if difference.abs() > 1.0 { Severity::Warning } else { Severity::Note },
+            if difference.abs() > large { Severity::Warning } else { Severity::Note },
             "the accelerometer has a large bias or scale error along gravity",
             "the estimator finds the bias once the vehicle moves; expect a slow start, or calibrate the IMU",
             None,
@@ -199,7 +230,7 @@ fn check_gravity(
 /// True if the norm of the specific force varies little around its median: it contains gravity, in whatever unit.
 fn has_steady_norm(samples: &[ImuSample]) -> bool {
     let norms: Vec<f64> = samples.iter().map(|sample| sample.specific_force_m_per_s2.norm()).collect();
-    percentile(&norms, 0.9) - percentile(&norms, 0.1) < 0.5 * median(&norms)
+    middle_range(&norms) < STEADY_RANGE * median(&norms)
 }
 
 fn check_gyroscope_bias(stationary: &[Window], findings: &mut Findings) -> Option<Vector3<f64>> {
@@ -211,7 +242,7 @@ fn check_gyroscope_bias(stationary: &[Window], findings: &mut Findings) -> Optio
     let axis = |index: usize| median(&rates.iter().map(|rate| rate[index]).collect::<Vec<_>>());
     let bias = Vector3::new(axis(0), axis(1), axis(2));
     let evidence = format!("({:+.4}, {:+.4}, {:+.4}) rad/s while stationary or hovering", bias.x, bias.y, bias.z);
-    if bias.norm() > 0.03 {
+    if bias.norm() > LARGE_BIAS_RAD_PER_S {
         let remedy = "calibrate the gyroscope before the flight, unless the vehicle rotated slowly all the time";
         findings.add(Severity::Note, Area::Imu, "the gyroscope's bias is large", evidence, remedy);
     } else {
@@ -233,8 +264,9 @@ fn check_clipping(samples: &[ImuSample], findings: &mut Findings) {
         for axis in 0..3 {
             let limit = components(gyroscope, axis).map(f64::abs).fold(0.0, f64::max);
             let hits = components(gyroscope, axis).filter(|value| value.abs() >= limit).count();
-            largest[usize::from(!gyroscope)] = largest[usize::from(!gyroscope)].max(limit);
-            if hits >= 3 && hits < samples.len() / 2 && limit > if gyroscope { 1.0 } else { 12.0 } {
+            let sensor = usize::from(!gyroscope);
+            largest[sensor] = largest[sensor].max(limit);
+            if hits >= MIN_CLIPPED && hits < samples.len() / 2 && limit > SMALLEST_LIMITS[sensor] {
                 clipped = true;
                 let unit = if gyroscope { "rad/s" } else { "m/s²" };
                 let title = format!("the {name} saturates on {}", ["x", "y", "z"][axis]);
@@ -246,7 +278,7 @@ fn check_clipping(samples: &[ImuSample], findings: &mut Findings) {
         }
     }
     let evidence = format!("largest values {:.2} rad/s and {:.1} m/s²", largest[0], largest[1]);
-    if largest[0] > 35.0 {
+    if largest[0] > LARGEST_RATE_RAD_PER_S {
         let remedy = "check the unit: sensor_msgs/Imu requires rad/s, and 35 rad/s is 2000 °/s";
         findings.add(Severity::Error, Area::Imu, "angular velocities appear to be in degrees", evidence, remedy);
         findings.state_faults([Fault::new(FaultKind::GyroscopeScale, &[std::f64::consts::PI / 180.0])]);
@@ -261,7 +293,7 @@ fn check_clipping(samples: &[ImuSample], findings: &mut Findings) {
     // A simulated sensor without noise repeats its values for as long as nothing moves.
     let stretches = samples.chunk_by(equal).filter(|equal| equal.len() <= LONGEST_REPETITION);
     let repeated: usize = stretches.map(|equal| equal.len() - 1).sum();
-    if repeated * 100 > samples.len() {
+    if repeated * REPEATED_ONE_IN > samples.len() {
         let evidence = format!("{repeated} of {} samples equal the previous one in all six values", samples.len());
         let remedy = "the driver sends faster than the sensor measures, or fills gaps: send each measurement once";
         findings.add(Severity::Warning, Area::Imu, "IMU samples repeat", evidence, remedy);
@@ -293,11 +325,11 @@ fn check_stationary(windows: &[Window], findings: &mut Findings) {
     }
     let listed: Vec<String> = periods
         .iter()
-        .take(6)
+        .take(LISTED)
         .map(|(begin, end)| format!("{:.1}–{:.1} s", seconds_from_ns(*begin), seconds_from_ns(*end)))
         .collect();
     let evidence = format!("{stationary_s:.1} of {total_s:.1} s: {}", listed.join(", "));
     let remedy = "scale and calibration are unobservable there; initialization needs motion";
-    let severity = if stationary_s > 0.5 * total_s { Severity::Warning } else { Severity::Note };
+    let severity = if stationary_s > MOSTLY_STATIONARY * total_s { Severity::Warning } else { Severity::Note };
     findings.add(severity, Area::Motion, "the vehicle is stationary or hovers", evidence, remedy);
 }

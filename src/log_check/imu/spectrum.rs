@@ -15,7 +15,12 @@ use crate::sensors::Rig;
 
 /// Length of a segment in seconds, rounded to a power of two of samples: rotors change their speed over longer ones.
 const SEGMENT_S: f64 = 0.64;
+/// Fewest samples of a segment.
 const MIN_SEGMENT: usize = 32;
+/// Number of segments that overlap at a sample.
+const OVERLAP: usize = 4;
+/// Relative difference of the duration of a segment from its samples over the rate from which it has a gap.
+const GAP_RATIO: f64 = 0.2;
 /// Maximum number of segments, distributed evenly over the log.
 const MAX_SEGMENTS: usize = 600;
 /// Upper frequency of the motion of vehicles and hands.
@@ -104,7 +109,7 @@ impl Spectrum {
 /// One-sided power densities of each segment and axis, by frequency from zero on.
 fn segment_powers(samples: &[(i64, Vector3<f64>)], length: usize, rate_hz: f64) -> Vec<Vec<f64>> {
     let Some(room) = samples.len().checked_sub(length) else { return Vec::new() };
-    let stride = (length / 4).max(room / MAX_SEGMENTS).max(1);
+    let stride = (length / OVERLAP).max(room / MAX_SEGMENTS).max(1);
     let window: Vec<f64> = (0..length).map(|index| blackman_harris((index as f64 + 0.5) / length as f64)).collect();
     let energy: f64 = window.iter().map(|weight| weight * weight).sum();
     let mut powers = Vec::new();
@@ -112,7 +117,7 @@ fn segment_powers(samples: &[(i64, Vector3<f64>)], length: usize, rate_hz: f64) 
         let segment = &samples[begin..begin + length];
         let span_s = seconds_from_ns(segment[length - 1].0 - segment[0].0);
         // Skipped: a gap would be a step of the signal.
-        if (span_s * rate_hz / (length - 1) as f64 - 1.0).abs() > 0.2 {
+        if (span_s * rate_hz / (length - 1) as f64 - 1.0).abs() > GAP_RATIO {
             continue;
         }
         for axis in 0..3 {
@@ -208,6 +213,8 @@ fn lines(mean: &[f64], start: usize, floor: f64, step_hz: f64) -> Vec<VibrationL
 const NOISE_TOO_SMALL: f64 = 3.0;
 /// Ratio of the rig's noise to the measured one from which it is reported.
 const NOISE_TOO_LARGE: f64 = 30.0;
+/// Difference of the logarithms of a ratio and of √rate within which one density is confused with the noise of a sample.
+const SAME_RATIO_LN: f64 = 0.3;
 
 /// Ratio of vibration to the white noise of a sample from which it is reported.
 const VIBRATION_RATIO: f64 = 3.0;
@@ -255,7 +262,7 @@ fn compare_density(name: &str, spectrum: &Spectrum, given: f64, unit: &str, find
         "{measured:.2e} {unit}/√Hz measured between {low_hz:.0} and {high_hz:.0} Hz at {rate_hz:.0} Hz, {given:.2e} in the rig"
     );
     // A density confused with the noise of one sample differs by √rate.
-    let discrete = |ratio: f64| (ratio.ln() - 0.5 * rate_hz.ln()).abs() < 0.3;
+    let discrete = |ratio: f64| (ratio.ln() - 0.5 * rate_hz.ln()).abs() < SAME_RATIO_LN;
     let field = format!("imu0.{name}_noise_density");
     // A density may include vibration on purpose.
     let excess = given / spectrum.density_with_vibration();

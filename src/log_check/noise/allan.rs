@@ -118,6 +118,7 @@ fn of_one_stretch(n: f64, m: f64, kind: NoiseKind) -> f64 {
 /// Confidence limits (68.3 %) of the true deviation from a deviation with these degrees of freedom, by the χ²
 /// distribution.
 pub(super) fn confidence(deviation: f64, degrees_of_freedom: f64) -> (f64, f64) {
+    /// Lowest quantile of the mean square: fewer degrees of freedom give no upper limit.
     const SMALLEST: f64 = 1e-4;
     let limit = |normal: f64| deviation / mean_square_quantile(degrees_of_freedom, normal).max(SMALLEST).sqrt();
     (limit(1.0), limit(-1.0))

@@ -81,6 +81,8 @@ const NOISE_SIGMAS: f64 = 2.0;
 const RATE_STEP_RAD_PER_S: f64 = 0.004;
 /// Largest change of the mean specific force from window to window: a tilt of 0.3°.
 const FORCE_STEP_M_PER_S2: f64 = 0.05;
+/// Tolerance of the difference of two means of noise, in standard deviations of one axis.
+const STEP_SIGMAS: f64 = 4.0;
 /// Minimum length of a stretch.
 const SHORTEST_NS: i64 = 3_000_000_000;
 /// Number of periods between two samples from which the interval is a gap.
@@ -94,8 +96,8 @@ pub(super) fn stationary_stretches(
     (from_ns, to_ns): (i64, i64),
 ) -> Vec<(i64, i64)> {
     let test = StationaryTest::new(MOTION, densities, NOISE_SIGMAS);
-    // Difference of two means of noise, per axis, at four standard deviations.
-    let step = |still: f64, density: f64| still.hypot(4.0 * density * (2.0 / seconds_from_ns(WINDOW_NS)).sqrt());
+    let step =
+        |still: f64, density: f64| still.hypot(STEP_SIGMAS * density * (2.0 / seconds_from_ns(WINDOW_NS)).sqrt());
     let (rate_step, force_step) = (step(RATE_STEP_RAD_PER_S, densities[0]), step(FORCE_STEP_M_PER_S2, densities[1]));
     let mut stretches: Vec<Vec<Window>> = vec![Vec::new()];
     let mut start_ns = from_ns;

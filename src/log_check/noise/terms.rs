@@ -23,6 +23,8 @@ const CLEAR_SLOPE: f64 = 0.15;
 /// Factor on the standard deviations of flicker noise and random walk: the estimates of adjacent octaves are correlated there
 /// (found by simulation, tested).
 const CORRELATED: f64 = 1.4;
+/// Lowest variance of the model by which a point is weighted, as a ratio of the measured variance.
+const LOWEST_VARIANCE: f64 = 0.05;
 /// Iterations of weights and degrees of freedom.
 const ROUNDS: usize = 4;
 /// Factor of `B²` in the variance, the square of 0.664.
@@ -170,7 +172,8 @@ impl Fit {
     /// Standard deviation of a point's variance by the model.
     fn sigma(&self, point: &AllanVariance, (stretches, axes): (&[AllanPhase], usize)) -> f64 {
         let freedom = degrees_of_freedom(stretches, point.count, self.dominant(point.tau_s)).max(1.0) * axes as f64;
-        self.variance(point.tau_s).max(0.05 * point.variance) * (2.0 / freedom + (2.0 * MODEL_ERROR).powi(2)).sqrt()
+        self.variance(point.tau_s).max(LOWEST_VARIANCE * point.variance)
+            * (2.0 / freedom + (2.0 * MODEL_ERROR).powi(2)).sqrt()
     }
 
     /// One weighted least-squares solution over some terms, all with the right sign.

@@ -19,7 +19,7 @@ use crate::text::without_signed_zeros;
 pub struct Finding {
     pub severity: Severity,
     pub area: Area,
-    /// In one sentence.
+    /// The finding in one sentence.
     pub title: String,
     /// Measured values with units.
     pub evidence: String,
@@ -59,7 +59,7 @@ pub struct ImageRotation {
     pub from_ns: i64,
     /// Header stamp of the second image.
     pub to_ns: i64,
-    /// Rotates vectors from the camera frame of the first image to that of the second.
+    /// Rotates vectors from the camera frame of the first image to the camera frame of the second.
     pub second_from_first: UnitQuaternion<f64>,
     /// Features of both images, for the readout; may be empty.
     pub tracks: Vec<RowTrack>,
@@ -87,7 +87,7 @@ pub struct CheckReport {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ProposedMask {
     pub camera_key: String,
-    /// The proposed pixels, without those of the rig's mask.
+    /// The proposed pixels, without the pixels of the rig's mask.
     pub mask: ImageMask,
 }
 

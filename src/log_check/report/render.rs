@@ -91,6 +91,7 @@ const WIDEST_NAME: usize = 60;
 
 /// Writes columns as wide as their widest cell, numbers aligned to the right.
 fn write_table<const N: usize>(out: &mut Formatter<'_>, rows: &[[String; N]]) -> Result {
+    /// Columns before the numbers.
     const FIRST_NUMBER: usize = 3;
     let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
     let widths: Vec<usize> = (0..N).map(width).collect();

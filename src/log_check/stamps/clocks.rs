@@ -1,6 +1,7 @@
 //! Clocks of the topics: delays, drift, different clocks, and the time offsets of the rig.
 
 use super::used_topics::UsedTopic;
+use crate::files::rig::read::MAX_TIMESHIFT_S;
 use crate::geometry::seconds_from_ns;
 use crate::log_check::report::{Area, Findings, Severity};
 use crate::log_check::statistics::{median, slope};
@@ -16,6 +17,14 @@ const OVERLAP_TOLERANCE_S: f64 = 1.0;
 const LARGE_SHIFT_S: f64 = 0.1;
 /// Largest delay of images: an offset from a whole number of seconds by less is one.
 const LARGEST_DELAY_S: f64 = 0.3;
+/// Difference of log times and stamps, in nanoseconds, within which they are equal.
+const EQUAL_NS: i64 = 1000;
+/// Time by which a stamp must be later than its log time to be in the future, in seconds.
+const FUTURE_S: f64 = 1e-3;
+/// Stamps in the future are reported above one in this many.
+const FUTURE_ONE_IN: usize = 20;
+/// Number of standard errors from which a drift is reported: latencies are correlated.
+const DRIFT_SIGMAS: f64 = 6.0;
 /// Leap seconds of TAI and of GPS time to UTC, since 2017.
 const WHOLE_OFFSETS_S: [(f64, &str); 2] =
     [(-37.0, "its clock is in TAI, 37 s ahead of UTC"), (-18.0, "its clock is in GPS time, 18 s ahead of UTC")];
@@ -55,7 +64,7 @@ impl Clocks {
 
 /// True if the log times equal the header stamps, so that they say nothing about the clock of the stamps.
 fn is_stamped_on_arrival(topic: &TopicSurvey) -> bool {
-    topic.times.iter().all(|times| (times.log_time_ns - times.stamp_ns).abs() < 1000)
+    topic.times.iter().all(|times| (times.log_time_ns - times.stamp_ns).abs() < EQUAL_NS)
 }
 
 /// Median of log time minus stamp in IMU time, in seconds; stamps that equal the log times are not shifted.
@@ -71,8 +80,8 @@ fn check_future(used: &UsedTopic<'_>, findings: &mut Findings) {
     let role = &used.role;
     let latencies: Vec<f64> =
         used.topic.times.iter().map(|times| seconds_from_ns(times.log_time_ns - times.stamp_ns) + shift_s).collect();
-    let early = latencies.iter().filter(|latency| **latency < -1e-3).count();
-    if early * 20 > latencies.len() {
+    let early = latencies.iter().filter(|latency| **latency < -FUTURE_S).count();
+    if early * FUTURE_ONE_IN > latencies.len() {
         let evidence = format!(
             "{early} of {} messages were logged before their stamp, the median by {:.3} s",
             latencies.len(),
@@ -89,7 +98,7 @@ fn check_drift(used: &UsedTopic<'_>, findings: &mut Findings) {
     let points: Vec<(f64, f64)> = used.topic.times.iter().map(point).collect();
     let (drift, error) = slope(&points);
     let length_s = points.last().map_or(0.0, |last| last.0) - points.first().map_or(0.0, |first| first.0);
-    if (drift * length_s).abs() > DRIFT_TOLERANCE_S && drift.abs() > 6.0 * error {
+    if (drift * length_s).abs() > DRIFT_TOLERANCE_S && drift.abs() > DRIFT_SIGMAS * error {
         let evidence = format!(
             "log time minus stamp changes by {:.1} ms over {length_s:.1} s ({:.0} ppm ± {:.0})",
             drift * length_s * 1e3,
@@ -133,11 +142,9 @@ fn compare_clocks(used: &[UsedTopic<'_>], clocks: &Clocks, findings: &mut Findin
 /// Time offset that brings the stamps of a topic to the clock of the IMU, as an entry of the rig. Delays of the messages
 /// are not known: the offset is a whole number of seconds if one lies within the usual delays.
 fn shift_to_set(used: &UsedTopic<'_>, imu_latency_s: f64) -> Option<String> {
-    /// Largest offset that a rig accepts for a gimbal.
-    const LARGEST_S: f64 = 60.0;
     let field = used.shift_field()?;
     let offset_s = used.topic.median_latency_s() - imu_latency_s;
-    if used.shift_key == Some("timeshift_gimbal_imu") && offset_s.abs() > LARGEST_S {
+    if used.shift_key == Some("timeshift_gimbal_imu") && offset_s.abs() > MAX_TIMESHIFT_S {
         return None;
     }
     let whole_s = offset_s.round();

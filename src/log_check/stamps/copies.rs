@@ -13,11 +13,15 @@ use crate::log_check::survey::Survey;
 use crate::log_check::survey::topic_survey::{Times, TopicSurvey};
 use crate::sensors::{CameraRig, Rig};
 
-/// Smallest share of messages with the content of an earlier one in two streams of equal messages; noise does not
+/// Smallest ratio of messages with the content of an earlier one in two streams of equal messages; noise does not
 /// repeat itself.
 const MIN_REPEATED: f64 = 0.1;
 /// Longest delay of the second stream, in seconds.
 const SEARCHED_S: f64 = 2.0;
+/// Ratio of copies, in tenths, that follow each other by two images if every second one is a copy.
+const EVERY_SECOND_TENTHS: usize = 8;
+/// Minimum number of copies for the same.
+const MIN_COPIES: usize = 3;
 
 /// Reports stamps that occur several times, and two streams with the same measurements.
 pub(super) fn check_copies(used: &UsedTopic<'_>, findings: &mut Findings) {
@@ -138,7 +142,7 @@ fn check_images_of(camera: &CameraRig, topic: &TopicSurvey, rotating_ns: &[i64],
         second(first),
         second(last),
     );
-    let (title, remedy) = if single * 10 > copies.len() * 8 && copies.len() > 2 {
+    let (title, remedy) = if single * 10 > copies.len() * EVERY_SECOND_TENTHS && copies.len() >= MIN_COPIES {
         let title = format!("every second image of {} is a copy of the one before", camera.key);
         (title, "let the driver or converter send each image once; a run skips the copies")
     } else {

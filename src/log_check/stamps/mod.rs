@@ -20,6 +20,20 @@ use crate::sensors::Rig;
 const RATE_TOLERANCE: f64 = 0.05;
 /// Smallest reported jitter of the stamps, as a ratio of the period.
 const JITTER_TOLERANCE: f64 = 0.2;
+/// Jitter that is a warning, as a ratio of the period.
+const LARGE_JITTER: f64 = 0.5;
+/// Quantile of the differences from the period that is the jitter.
+const JITTER_QUANTILE: f64 = 0.95;
+/// Ratio of missing messages that is a warning.
+const MISSING_TOLERANCE: f64 = 0.01;
+/// Gap that is a warning, in seconds.
+const LONG_GAP_S: f64 = 0.5;
+/// Lowest usual rate of an IMU.
+const SLOWEST_IMU_HZ: f64 = 100.0;
+/// Lowest usual rate of a camera.
+const SLOWEST_CAMERA_HZ: f64 = 5.0;
+/// Ratio of the lowest rate below which a sensor is slow: clocks and losses change a rate by less.
+const SLOW_RATIO: f64 = 0.95;
 
 /// Lateness in seconds up to which a run sorts messages.
 const SORTED_S: f64 = 0.1;
@@ -123,7 +137,11 @@ fn check_gaps(role: &str, spacing: &Spacing, of_images: bool, findings: &mut Fin
         spacing.start_s(longest),
         lost + received
     );
-    let severity = if lost > 0.01 * received || steps[longest] > 0.5 { Severity::Warning } else { Severity::Note };
+    let severity = if lost > MISSING_TOLERANCE * received || steps[longest] > LONG_GAP_S {
+        Severity::Warning
+    } else {
+        Severity::Note
+    };
     let remedy = "record with less load or a larger buffer; over a gap the IMU is interpolated and features are lost";
     findings.add(severity, Area::Time, format!("{role} has gaps"), evidence, remedy);
 }
@@ -146,11 +164,11 @@ fn check_jitter(role: &str, spacing: &Spacing, findings: &mut Findings) {
     }
     let period = spacing.period_s;
     let scatter: Vec<f64> = spacing.steps_s.iter().map(|step| (step - period).abs()).collect();
-    let jitter = percentile(&scatter, 0.95);
+    let jitter = percentile(&scatter, JITTER_QUANTILE);
     if period > 0.0 && jitter > JITTER_TOLERANCE * period {
         let evidence =
             format!("5 % of the steps differ from {:.3} ms by more than {:.3} ms", period * 1e3, jitter * 1e3);
-        let severity = if jitter > 0.5 * period { Severity::Warning } else { Severity::Note };
+        let severity = if jitter > LARGE_JITTER * period { Severity::Warning } else { Severity::Note };
         let remedy = "these appear to be arrival times: stamp in the driver, from the sensor's own clock or trigger";
         findings.add(severity, Area::Time, format!("stamps of {role} jitter"), evidence, remedy);
     }
@@ -175,11 +193,11 @@ fn check_rate(role: &str, period_s: f64, nominal_hz: Option<f64>, findings: &mut
         findings.add(severity, Area::Time, format!("the rate of {role} differs from the rig"), evidence, remedy);
     }
     let slowest_hz = match role {
-        "imu0" => 100.0,
-        _ if role.starts_with("cam") => 5.0,
+        "imu0" => SLOWEST_IMU_HZ,
+        _ if role.starts_with("cam") => SLOWEST_CAMERA_HZ,
         _ => return,
     };
-    if measured_hz < 0.95 * slowest_hz {
+    if measured_hz < SLOW_RATIO * slowest_hz {
         let evidence = format!("{measured_hz:.1} Hz, usually at least {slowest_hz:.0} Hz");
         let remedy = "record at a higher rate: motion between samples is assumed smooth";
         findings.add(Severity::Warning, Area::Time, format!("{role} is slow"), evidence, remedy);

@@ -5,22 +5,30 @@ use crate::faults::FaultKind;
 use crate::flight_log::stamps::spacing::Spacing;
 use crate::geometry::seconds_from_ns;
 use crate::log_check::report::{Area, Findings, Measurement, Severity};
-use crate::log_check::statistics::{median, percentile};
+use crate::log_check::statistics::{median, middle_range};
 use crate::log_check::survey::topic_survey::TopicSurvey;
 use crate::sensors::ImuSample;
 
-/// Smallest share of a publisher among the messages.
+/// Smallest ratio of a publisher among the messages.
 const MIN_SHARE: f64 = 0.05;
-/// Smallest share of each of two sequences of stamps.
+/// Smallest ratio of each of two sequences of stamps.
 const MIN_SEQUENCE: f64 = 0.3;
-/// Smallest ratio of the rate to that of the rig at which two publishers can share a topic.
+/// Smallest ratio of the rate to the rate in the rig at which two publishers can share a topic.
 const DOUBLE_RATE: f64 = 1.7;
-/// Largest such ratio.
+/// Largest ratio of the rate to the rate in the rig for the same.
 const TRIPLE_RATE: f64 = 2.6;
 /// Smallest ratio of the shorter of two alternating steps to the mean step.
 const MIN_STEP: f64 = 0.15;
-/// Smallest ratio of the change to the next sample to that to the next but one, for samples of two IMUs in turn.
+/// Smallest ratio of the change to the next sample to the change to the next but one, for samples of two IMUs in turn.
 const ALTERNATING: f64 = 2.5;
+/// Smallest difference of two alternating steps, as a ratio of the mean step.
+const MIN_DIFFERENCE: f64 = 0.3;
+/// Largest range of the middle 80 % of equal steps, as a ratio of the difference of alternating ones.
+const LARGEST_SPREAD: f64 = 0.5;
+/// Stamps of two sequences run backwards in at least one of this many messages.
+const BACKWARDS_ONE_IN: usize = 10;
+/// Messages that belong to neither sequence are at most one in this many.
+const OTHERS_ONE_IN: usize = 50;
 
 /// Reports the topic of a sensor on which two publishers send in turn.
 pub(super) fn has_two_publishers(
@@ -77,7 +85,7 @@ fn frames_in_turn(topic: &TopicSurvey) -> Option<String> {
 fn two_sequences(topic: &TopicSurvey) -> Option<String> {
     let stamps_ns = topic.stamps_without_duplicates();
     let backwards = stamps_ns.windows(2).filter(|pair| pair[1] < pair[0]).count();
-    if backwards * 10 < stamps_ns.len() {
+    if backwards * BACKWARDS_ONE_IN < stamps_ns.len() {
         return None;
     }
     let mut sequences: [Vec<i64>; 2] = [Vec::new(), Vec::new()];
@@ -92,7 +100,7 @@ fn two_sequences(topic: &TopicSurvey) -> Option<String> {
     }
     let [first, second] = &sequences;
     let smallest = first.len().min(second.len()) as f64;
-    if smallest < MIN_SEQUENCE * stamps_ns.len() as f64 || others * 50 > stamps_ns.len() {
+    if smallest < MIN_SEQUENCE * stamps_ns.len() as f64 || others * OTHERS_ONE_IN > stamps_ns.len() {
         return None;
     }
     let offset_s = |position: usize| Some(seconds_from_ns(*second.get(position)? - *first.get(position)?));
@@ -116,13 +124,12 @@ fn double_rate(used: &UsedTopic<'_>, spacing: &Spacing, of_imu: bool, imu: &[Imu
     let rate = format!("{:.1} Hz, {ratio:.1} times the rate of the rig", 1.0 / mean_s);
     let every_second = |from: usize| steps_s.iter().skip(from).step_by(2).copied().collect::<Vec<f64>>();
     let (even, odd) = (every_second(0), every_second(1));
-    let spread = |steps: &[f64]| percentile(steps, 0.9) - percentile(steps, 0.1);
     let difference_s = (median(&even) - median(&odd)).abs();
     // Closer pairs can be batches of one publisher.
     let apart_s = median(&even).min(median(&odd));
     if apart_s > MIN_STEP * mean_s
-        && difference_s > 0.3 * mean_s
-        && spread(&even).max(spread(&odd)) < 0.5 * difference_s
+        && difference_s > MIN_DIFFERENCE * mean_s
+        && middle_range(&even).max(middle_range(&odd)) < LARGEST_SPREAD * difference_s
     {
         let (even_ms, odd_ms) = (1e3 * median(&even), 1e3 * median(&odd));
         return Some(format!("{rate}, with steps of {even_ms:.2} and {odd_ms:.2} ms in turn"));

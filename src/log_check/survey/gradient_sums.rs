@@ -127,6 +127,8 @@ impl GradientSums {
     }
 }
 
+/// The edge of an image is the gradient that one in this many pixels exceeds.
+const EDGE_ONE_IN: usize = 100;
 /// A pixel with a larger gradient, in grey levels per pixel, has texture.
 const TEXTURE_SLOPE: usize = 12;
 /// Pixels at least this bright count as overexposed.
@@ -172,7 +174,7 @@ pub(crate) fn measure(image: &GrayImage) -> ImageMeasure {
     let mut steeper = 0;
     let edge = (0..256).rev().find(|slope| {
         steeper += slopes[*slope];
-        steeper * 100 >= count.max(1)
+        steeper * EDGE_ONE_IN >= count.max(1)
     });
     ImageMeasure {
         resolution_px: [width, height],

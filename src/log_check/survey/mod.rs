@@ -6,7 +6,6 @@ mod imu_samples;
 pub(super) mod topic_survey;
 
 use std::collections::BTreeMap;
-use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
@@ -16,6 +15,7 @@ use self::gradient_sums::{GradientSums, ImageMeasure, measure};
 use self::imu_samples::{UnmeasuredStamps, measured};
 use self::topic_survey::{Times, TopicSurvey};
 use super::statistics::white_sigma;
+use crate::files::rig::read::MAX_LIMIT_RAD;
 use crate::flight_log::container::DecodedBlock;
 use crate::flight_log::grey_levels::GreyLevels;
 use crate::flight_log::images::decoding::decode_image;
@@ -347,7 +347,7 @@ fn take_gimbal_imu(
 
 /// True for a reading that can be an angle in radians, with whole turns.
 pub(crate) fn is_in_radians(reading: f64) -> bool {
-    reading.abs() <= 2.0 * TAU
+    reading.abs() <= MAX_LIMIT_RAD
 }
 
 /// Readings of all messages as samples of all joints; those that are not finite are omitted.

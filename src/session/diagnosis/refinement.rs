@@ -15,6 +15,8 @@ const LEAST_SHIFT_S: f64 = 5e-4;
 const LEAST_FOCAL: f64 = 2e-3;
 /// Smallest offset of a joint that is worth a trial, in radians (1°).
 const LEAST_OFFSET_RAD: f64 = 0.017;
+/// Smallest and largest factor on the noise of the encoders that is worth a trial.
+const NOISE_FACTORS: [f64; 2] = [1.1, 1e3];
 /// Fewest steps on either side of a change of a joint's offset.
 const STEPS_BESIDE: usize = 15;
 
@@ -43,7 +45,7 @@ pub(super) fn refined(run: &DiagnosedRun<'_>, candidates: &[RankedTrial]) -> Vec
     }
     if let Some(best) = best_of(FaultKind::EncoderNoise) {
         let factor = best.hypothesis.changes.encoder_noise * best.misfit.factors[1].mean_square().sqrt();
-        if factor > 1.1 && factor < 1e3 {
+        if factor > NOISE_FACTORS[0] && factor < NOISE_FACTORS[1] {
             let changes = ForkChanges { encoder_noise: rounded(factor), ..ForkChanges::default() };
             all.push(TrialHypothesis::change(FaultKind::EncoderNoise, changes, 1));
         }

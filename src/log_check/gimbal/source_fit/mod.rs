@@ -1,5 +1,5 @@
 //! Interpretation of a gimbal's attitude checked by the rotations in the images: frame, axes, order, signs, unit and
-//! time offset that predict them, if those of the rig do not.
+//! time offset that predict them, if the rig's do not.
 
 mod meanings;
 #[cfg(test)]
@@ -31,8 +31,9 @@ const BETTER_RATIO: f64 = 0.6;
 /// Time offsets (`t_imu = t_gimbal + shift`) beyond the rig's with which every interpretation is tried: delays of
 /// gimbals reach 0.2 s.
 const COARSE_SHIFTS_S: [f64; 5] = [0.0, -0.05, -0.1, -0.15, -0.2];
-/// Range and step of the search for the time offset.
+/// Largest magnitude of a time offset in the search.
 const MAX_SHIFT_S: f64 = 0.3;
+/// Step of the search for the time offset.
 const SHIFT_STEP_S: f64 = 0.01;
 /// Smallest reported time offset: stamps of gimbals at 50 Hz are no more accurate.
 const SHIFT_TOLERANCE_S: f64 = 0.01;
@@ -40,6 +41,10 @@ const SHIFT_TOLERANCE_S: f64 = 0.01;
 const OFFSET_TOLERANCE_RAD: f64 = 0.026;
 /// Minimum relative decrease of the squared misfit by a time offset or a joint offset.
 const MIN_GAIN: f64 = 0.2;
+/// Steps of the coarse and the fine search for an offset of the first joint, in degrees.
+const OFFSET_STEPS_DEG: [f64; 2] = [10.0, 1.0];
+/// Number of those steps to either side: half a revolution, and one coarse step.
+const OFFSET_STEPS: [i32; 2] = [18, 10];
 
 /// Interpretation that fits the images, in place of the rig's.
 pub(crate) struct FittedSource {
@@ -50,7 +55,7 @@ pub(crate) struct FittedSource {
 /// Joined rotation of the camera.
 #[derive(Clone)]
 struct Span {
-    /// In IMU time.
+    /// Stamps of the first and the last image, in IMU time.
     from_ns: i64,
     to_ns: i64,
     /// Rotation vector measured from the images, second from first, in radians.
@@ -245,7 +250,7 @@ impl SourceFit<'_> {
         if is_near(of_best) {
             return (best, near);
         }
-        // The least distance is that of one of them.
+        // One of them has the least distance.
         let chosen = near.remove(0);
         (chosen, near)
     }
@@ -316,8 +321,9 @@ impl SourceFit<'_> {
             let best = (0..costs.len()).min_by(|a, b| costs[*a].1.total_cmp(&costs[*b].1)).unwrap_or(0);
             (vertex(&costs, best, step_rad), costs[best].1)
         };
-        let (coarse_rad, _) = scan(0.0, 10_f64.to_radians(), 18);
-        let (offset_rad, least) = scan(coarse_rad, 1_f64.to_radians(), 10);
+        let [coarse_step_rad, fine_step_rad] = OFFSET_STEPS_DEG.map(f64::to_radians);
+        let (coarse_rad, _) = scan(0.0, coarse_step_rad, OFFSET_STEPS[0]);
+        let (offset_rad, least) = scan(coarse_rad, fine_step_rad, OFFSET_STEPS[1]);
         let unturned = cost(0.0).1;
         let gain = 1.0 - (least / unturned.max(f64::MIN_POSITIVE)).powi(2);
         if offset_rad.abs() < OFFSET_TOLERANCE_RAD || gain < MIN_GAIN {
