@@ -92,7 +92,7 @@ impl Player {
     }
 
     /// Draws one frame.
-    pub(crate) fn picture(&mut self, recording: &Recording, cursor_ns: i64) {
+    pub(crate) fn draw(&mut self, recording: &Recording, cursor_ns: i64) {
         let frame = self.lay_out(recording, cursor_ns, Vec::new());
         self.paint(&frame);
     }
@@ -130,12 +130,12 @@ pub(crate) fn measure(recording: &Recording, player: &mut Player) -> Table {
     for preset in Preset::all() {
         player.state.tiles.arrange(preset);
         for _ in 0..SETTLING {
-            player.picture(recording, first_ns);
+            player.draw(recording, first_ns);
         }
         let resting = vec![*played.last().unwrap_or(&first_ns); PAUSED];
         for (what, cursors_ns) in [("moving", played), ("stationary", &resting[..]), ("pointer moves", &resting[..])] {
             // The first frame after a seek is not measured with the stationary cursor.
-            player.picture(recording, cursors_ns[0]);
+            player.draw(recording, cursors_ns[0]);
             let mut times = [Times::default(), Times::default(), Times::default()];
             let before_s = cpu_s();
             for (number, cursor_ns) in cursors_ns.iter().enumerate() {

@@ -26,7 +26,7 @@ pub(crate) fn measure(arguments: &Arguments) -> Result<Table> {
         sleep(Duration::from_micros(200));
     }
     let recording = session.recording();
-    player.picture(&recording, recording.last_stamp_ns());
+    player.draw(&recording, recording.last_stamp_ns());
     let mut table = Table::new(format!("Opening a log of {}", mib(size as usize)), &["from the command to", "ms"]);
     table.row("the opened log", [opened]);
     table.row("its first image", [image]);

@@ -16,7 +16,7 @@ use super::study_sample;
 
 const OPTIONS: HeadlessOptions =
     HeadlessOptions { size_px: [1920, 1080], pixels_per_point: 1.0, theme: ThemeName::Dark };
-const PICTURES: usize = 40;
+const DRAWN: usize = 40;
 
 /// Measures a simulated study with at least `runs` runs.
 pub(crate) fn measure(runs: usize) -> Result<Table> {
@@ -48,18 +48,18 @@ pub(crate) fn measure(runs: usize) -> Result<Table> {
     table.row("first frame", cells(&times));
     measure(&mut state, Vec::new(), &mut <[Times; 2]>::default());
     let mut times = <[Times; 2]>::default();
-    for _ in 0..PICTURES {
+    for _ in 0..DRAWN {
         measure(&mut state, Vec::new(), &mut times);
     }
     table.row("stationary", cells(&times));
     let mut times = <[Times; 2]>::default();
-    for number in 0..PICTURES {
+    for number in 0..DRAWN {
         let pointer = Event::PointerMoved(pos2(140.0 + 8.0 * number as f32, 150.0));
         measure(&mut state, vec![pointer], &mut times);
     }
     table.row("pointer over the points", cells(&times));
     let mut times = <[Times; 2]>::default();
-    for number in 0..PICTURES {
+    for number in 0..DRAWN {
         let filter = format!("ate_rmse_m < {}", 0.2 + 0.01 * number as f64);
         let options = StudyOptions { filter, ..StudyOptions::default() };
         state = StudyState::new(Arc::clone(&study), &options).map_err(|error| anyhow!(error))?;

@@ -63,7 +63,7 @@ pub(crate) fn measure(session: &mut Session, player: &mut Player) -> Table {
         session.apply(command);
         session.settle();
         times[0].add(&watch);
-        player.picture(&session.recording(), session.cursor_ns());
+        player.draw(&session.recording(), session.cursor_ns());
         times[1].add(&watch);
     };
     let cells = |times: &[Times; 2]| times.iter().flat_map(Times::cells).collect::<Vec<_>>();

@@ -106,7 +106,8 @@ impl Default for GreyLevels {
 }
 
 impl GreyLevels {
-    /// Conversion for a recording by images of its stretches, each with the log time of its middle, in time order.
+    /// Conversion from the grey values of sampled images: for each stretch of the recording, in time order, the log time of
+    /// its middle in nanoseconds and the values of its images.
     pub(super) fn of_stretches(stretches: &[(i64, Vec<ValueRange>)]) -> Self {
         let images = || stretches.iter().flat_map(|(_, images)| images);
         let Some(brightest) = images().map(|image| image.brightest).max() else { return Self::default() };

@@ -21,9 +21,9 @@ fn the_sample_is_consistent() {
     assert_eq!(image.pixels.len(), image.width * image.height);
 }
 
-/// Stores a screenshot for inspection in the folder of the environment variable `DCVINS_PICTURES`.
+/// Stores a screenshot for inspection in the folder of the environment variable `DCVINS_SCREENSHOTS`.
 pub(crate) fn keep_screenshot(name: &str, screenshot: &image::RgbaImage) {
-    if let Some(folder) = std::env::var_os("DCVINS_PICTURES") {
+    if let Some(folder) = std::env::var_os("DCVINS_SCREENSHOTS") {
         screenshot.save(std::path::Path::new(&folder).join(format!("{name}.png"))).unwrap();
     }
 }

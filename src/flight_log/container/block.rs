@@ -36,7 +36,7 @@ pub(crate) struct DecodedBlock {
     pub(crate) messages: Vec<MessageSpan>,
     /// Schema and channel records, as opcode and body.
     pub(crate) definitions: Vec<(u8, Range<usize>)>,
-    /// Damage of the block; `messages` are those before it.
+    /// Damage of the block; `messages` precede it.
     pub(crate) damage: Option<String>,
 }
 

@@ -6,7 +6,7 @@ const REMEMBERED: u32 = 8;
 /// Decides which of the images that equal the one before are copies: a camera without noise that does not move may see
 /// the same twice.
 ///
-/// An image is a copy if the vehicle rotates, or if images that differ and images that equal the one before take turns:
+/// An image is a copy if the vehicle rotates, or if images that differ and images that equal the one before alternate:
 /// a scene that comes to a stop gives equal images from then on.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct CopyJudge {

@@ -98,7 +98,7 @@ impl RawEncoding {
         }
     }
 
-    /// Gray values of all pixels in the width of the samples, row by row; rows as for [`Self::gray`].
+    /// Gray values of all pixels with the bits of the samples (8 or 16), row by row; rows as for [`Self::gray`].
     pub(crate) fn values(self, raw: &ImageMessage<'_>) -> Vec<u16> {
         self.mapped(raw, |value| value)
     }

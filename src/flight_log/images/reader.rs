@@ -9,7 +9,7 @@ use crate::flight_log::grey_levels::GreyLevels;
 use crate::flight_log::log::relative_ns;
 use crate::flight_log::messages::{MessageKind, read_video_packet, stamp_ns};
 use crate::flight_log::stamps::clock::StampClock;
-use crate::flight_log::video::{PictureStream, keyframe_before};
+use crate::flight_log::video::{VideoStream, keyframe_before};
 use crate::flight_log::{FlightLog, LogError};
 use crate::geometry::seconds_from_ns;
 use crate::sensors::{GrayImage, Rig, UnknownCamera};
@@ -47,13 +47,13 @@ struct ImageCache {
     /// Cached images by camera and index; the most recently used is the last.
     images: Vec<((usize, usize), Arc<GrayImage>)>,
     /// State of each camera's video decoder.
-    streams: Vec<PictureStream>,
+    streams: Vec<VideoStream>,
     /// Cached video frames by camera and index; the most recently used is the last.
-    pictures: Vec<((usize, usize), Picture)>,
+    frames: Vec<((usize, usize), VideoFrame)>,
 }
 
 /// Decoded video frame, or a description of the problem.
-type Picture = Result<Arc<GrayImage>, String>;
+type VideoFrame = Result<Arc<GrayImage>, String>;
 
 impl ImageReader {
     /// Indexes the images of all cameras of a rig whose topics are in the log.
@@ -71,13 +71,13 @@ impl ImageReader {
             })
             .collect();
         let topics = cameras.iter().map(|camera| log.topic_index(&camera.topic)).collect();
-        let streams = cameras.iter().map(|_| PictureStream::default()).collect();
+        let streams = cameras.iter().map(|_| VideoStream::default()).collect();
         let cache = ImageCache {
             topics,
             blocks: BlockCache::new(BLOCKS),
             images: Vec::with_capacity(IMAGES + 1),
             streams,
-            pictures: Vec::new(),
+            frames: Vec::new(),
         };
         Self { log, cameras, cache: Mutex::new(cache) }
     }
@@ -100,7 +100,7 @@ impl ImageReader {
         if !camera.kind.is_video() || index >= camera.count {
             return true;
         }
-        self.cache.lock().decode_pictures(&self.log, number, camera.kind, index, go_on)
+        self.cache.lock().decode_frames(&self.log, number, camera.kind, index, go_on)
     }
 
     /// Numbers and stamps (header stamps, or log times by the rig) of a camera's images in the order of the stamps, in nanoseconds since the start of the
@@ -154,7 +154,7 @@ impl ImageReader {
             path: self.log.path().to_owned(),
         };
         if camera.kind.is_video() {
-            return cache.picture(&self.log, number, camera.kind, index).map_err(bad);
+            return cache.frame(&self.log, number, camera.kind, index).map_err(bad);
         }
         let Some((block, message)) = self.log.message(&mut cache.blocks, position) else {
             let block = cache.blocks.get(self.log.file(), &self.log.index().blocks, position.block);
@@ -182,15 +182,15 @@ fn cached<V: Clone>(entries: &mut Vec<((usize, usize), V)>, key: (usize, usize))
 }
 
 impl ImageCache {
-    fn picture(&mut self, log: &FlightLog, camera: usize, kind: MessageKind, index: usize) -> Picture {
-        self.decode_pictures(log, camera, kind, index, &|| true);
-        cached(&mut self.pictures, (camera, index)).unwrap_or_else(|| Err("it is not a frame of a video".to_owned()))
+    fn frame(&mut self, log: &FlightLog, camera: usize, kind: MessageKind, index: usize) -> VideoFrame {
+        self.decode_frames(log, camera, kind, index, &|| true);
+        cached(&mut self.frames, (camera, index)).unwrap_or_else(|| Err("it is not a frame of a video".to_owned()))
     }
 
     /// Decodes a video up to frame `index`, starting at the last decoded frame or at the keyframe, while `go_on`
     /// returns true.
     /// Returns true if the frame is cached.
-    fn decode_pictures(
+    fn decode_frames(
         &mut self,
         log: &FlightLog,
         camera: usize,
@@ -198,7 +198,7 @@ impl ImageCache {
         index: usize,
         go_on: &dyn Fn() -> bool,
     ) -> bool {
-        if cached(&mut self.pictures, (camera, index)).is_some() {
+        if cached(&mut self.frames, (camera, index)).is_some() {
             return true;
         }
         let stands = self.streams[camera].next();
@@ -210,15 +210,15 @@ impl ImageCache {
             if !go_on() {
                 return false;
             }
-            let picture = self.next_picture(log, camera, kind, number).map(Arc::new);
-            self.pictures.push(((camera, number), picture));
+            let frame = self.next_frame(log, camera, kind, number).map(Arc::new);
+            self.frames.push(((camera, number), frame));
             self.release();
         }
         true
     }
 
     /// Decodes message `number`, which follows the last decoded one.
-    fn next_picture(
+    fn next_frame(
         &mut self,
         log: &FlightLog,
         camera: usize,
@@ -239,13 +239,13 @@ impl ImageCache {
 
     /// Drops the least recently used frames.
     fn release(&mut self) {
-        let pixels = |entry: &Picture| entry.as_ref().map_or(1, |image| image.pixels.len());
-        let mut held: usize = self.pictures.iter().map(|(_, picture)| pixels(picture)).sum();
+        let pixels = |entry: &VideoFrame| entry.as_ref().map_or(1, |image| image.pixels.len());
+        let mut held: usize = self.frames.iter().map(|(_, frame)| pixels(frame)).sum();
         let mut released = 0;
-        while held > VIDEO_PIXELS && released + 1 < self.pictures.len() {
-            held -= pixels(&self.pictures[released].1);
+        while held > VIDEO_PIXELS && released + 1 < self.frames.len() {
+            held -= pixels(&self.frames[released].1);
             released += 1;
         }
-        self.pictures.drain(..released);
+        self.frames.drain(..released);
     }
 }

@@ -31,7 +31,7 @@ impl ImuMerge {
         self.accelerometer.push_back((stamp_ns, specific_force_m_per_s2));
     }
 
-    /// True if the next sample needs another angular velocity.
+    /// True if the next sample waits for another angular velocity.
     pub(crate) fn needs_gyroscope(&self) -> bool {
         self.gyroscope.is_empty()
     }

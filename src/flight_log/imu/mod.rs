@@ -1,4 +1,4 @@
-//! IMU samples of a log: measured ones without what no sensor measured, and those of two topics joined.
+//! IMU samples of a log: a filter of values that no sensor measured, and the merge of gyroscope and accelerometer topics.
 
 pub(crate) mod filter;
 pub(crate) mod merge;

@@ -5,9 +5,9 @@ use crate::geometry::{self, seconds_from_ns};
 /// Steps shorter and longer than these ratios of the mean step occur together only in batches.
 const SHORT_RATIO: f64 = 0.3;
 const LONG_RATIO: f64 = 1.5;
-/// Smallest share of short steps in batches.
+/// Smallest ratio of short steps in batches.
 const MIN_SHORT: f64 = 0.25;
-/// Smallest share of long steps: the largest batch has a hundred messages.
+/// Smallest ratio of long steps: the largest batch has a hundred messages.
 const MIN_LONG: f64 = 0.01;
 /// Largest relative difference between a sensor's period and the steps of one that loses messages.
 const PERIOD_TOLERANCE: f64 = 0.2;

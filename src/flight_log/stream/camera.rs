@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::super::grey_levels::GreyLevels;
 use super::super::log::relative_ns;
 use super::super::messages::{self, MessageKind};
-use super::super::video::PictureStream;
+use super::super::video::VideoStream;
 use super::super::{FlightLog, LogError, WarningKind};
 use super::gaps::GapWatch;
 use super::ordered::{Decoder, MessageSource, OrderedSamples};
@@ -54,7 +54,7 @@ impl CameraStream {
         let info = log.require_topic(&format!("{}.rostopic", camera.key), &camera.topic, &MessageKind::IMAGES)?;
         let kind = info.kind.unwrap_or(MessageKind::Image);
         let images = if kind.is_video() {
-            let decoder = picture_decoder(log, kind, camera);
+            let decoder = video_decoder(log, kind, camera);
             OrderedSamples::new(log, &camera.topic, from_ns, true, decoder).starting_at_keyframe(log, kind)
         } else {
             let decoder = image_decoder(kind, log.epoch_ns(), StampClock::of_rig(camera.use_log_time));
@@ -156,11 +156,11 @@ fn problem_text(problem: ImageProblem, resolution_px: [usize; 2], key: &str) -> 
 }
 
 /// Decodes the frames of a video topic; a skipped number is an unreadable message.
-fn picture_decoder(log: &FlightLog, kind: MessageKind, camera: &CameraRig) -> Decoder<PendingImage> {
+fn video_decoder(log: &FlightLog, kind: MessageKind, camera: &CameraRig) -> Decoder<PendingImage> {
     let (epoch_ns, limits) = (log.epoch_ns(), log.file().limits().clone());
     let (resolution_px, key) = (camera.model.resolution_px, camera.key.clone());
     let clock = StampClock::of_rig(camera.use_log_time);
-    let mut stream = PictureStream::default();
+    let mut stream = VideoStream::default();
     Box::new(move |source: MessageSource<'_>| {
         let packet = messages::read_video_packet(kind, source.data).map_err(|error| Refusal::not_decodable(&error));
         let packet = packet.inspect_err(|_| stream.lose_message())?;

@@ -177,8 +177,8 @@ fn joint_states_read_back() {
 
 #[test]
 fn an_image_is_not_decoded_when_its_header_claims_too_much() {
-    let picture = image_at(0, [WIDTH, HEIGHT]);
-    let gray = image::GrayImage::from_raw(WIDTH as u32, HEIGHT as u32, picture.pixels).unwrap();
+    let frame = image_at(0, [WIDTH, HEIGHT]);
+    let gray = image::GrayImage::from_raw(WIDTH as u32, HEIGHT as u32, frame.pixels).unwrap();
     for format in [image::ImageFormat::Png, image::ImageFormat::Jpeg] {
         let mut data = std::io::Cursor::new(Vec::new());
         gray.write_to(&mut data, format).unwrap();

@@ -1,6 +1,6 @@
 use std::cell::Cell;
 
-use super::super::video::missing_pictures;
+use super::super::video::missing_frames;
 use super::super::video::tests::{Stream, stream};
 use super::*;
 use crate::flight_log::writer::testing as encode;
@@ -157,7 +157,7 @@ fn a_video_plays_like_images() {
 }
 
 #[test]
-fn pictures_are_read_in_any_order() {
+fn frames_are_read_in_any_order() {
     for name in ["h264", "h265", "h264_b_frames"] {
         let folder = TempDir::new().unwrap();
         let (path, stream) = write(folder.path(), name, Storage::Ros, &[]);
@@ -184,7 +184,7 @@ fn decoding_that_is_ended_goes_on_where_it_stands() {
     // Frames 3 to 7 remain: five calls of `go_on`, all with the answer true.
     assert!(reader.decode_before("cam0", 7, &go_on));
     assert_eq!(remaining.get(), 0);
-    assert!(reader.decode_before("cam0", 2, &go_on), "a decoded picture asks nothing");
+    assert!(reader.decode_before("cam0", 2, &go_on), "a decoded frame asks nothing");
     for index in [7, 2] {
         assert_eq!(crc32(&reader.image("cam0", index).unwrap()), expected[index]);
     }
@@ -192,7 +192,7 @@ fn decoding_that_is_ended_goes_on_where_it_stands() {
 
 /// An unreadable message ends the stream both for the images of the window and for the frames of a run.
 #[test]
-fn pictures_behind_an_unreadable_message_are_missing() {
+fn frames_behind_an_unreadable_message_are_missing() {
     for name in ["h264", "h265"] {
         let folder = TempDir::new().unwrap();
         let stream = stream(name);
@@ -215,7 +215,7 @@ fn pictures_behind_an_unreadable_message_are_missing() {
 }
 
 #[test]
-fn pictures_behind_a_lost_one_are_left_out_up_to_the_next_keyframe() {
+fn frames_behind_a_lost_one_are_left_out_up_to_the_next_keyframe() {
     let folder = TempDir::new().unwrap();
     let (path, stream) = write(folder.path(), "h264", Storage::Ros, &[11]);
     let (frames, warnings) = play_file(&path, &rig_text(), 0.0);
@@ -228,12 +228,12 @@ fn pictures_behind_a_lost_one_are_left_out_up_to_the_next_keyframe() {
     let warning = warning_with(&warnings, &["/camera: 4 messages from 0.627 s to 0.777 s dropped"]);
     assert!(warning.message.contains("the frame cannot be decoded"), "{}", warning.message);
     let log = FlightLog::open(&path).unwrap();
-    let (read, missing) = missing_pictures(&log, "/camera", MessageKind::CompressedVideo, 100);
+    let (read, missing) = missing_frames(&log, "/camera", MessageKind::CompressedVideo, 100);
     // Message 11 is the first one after the lost frame; the keyframe is message 15.
     assert_eq!((read, missing.len()), (23, 1));
     assert_eq!((missing[0].first, missing[0].count), (11, 4));
     assert!(missing[0].problem.contains("missing"), "{}", missing[0].problem);
-    assert_eq!(missing_pictures(&log, "/camera", MessageKind::CompressedVideo, 11), (11, Vec::new()));
+    assert_eq!(missing_frames(&log, "/camera", MessageKind::CompressedVideo, 11), (11, Vec::new()));
     let reader = ImageReader::new(Arc::new(FlightLog::open(&path).unwrap()), &rig_from(&rig_text()));
     let error = reader.image("cam0", 13).unwrap_err().to_string();
     assert!(error.contains("damaged or missing"), "{error}");

@@ -83,10 +83,10 @@ impl VideoDecoder {
             return Err(unreadable("it depends on a damaged or missing frame; reading continues at the next keyframe"));
         }
         let (stream, limits) = (&mut self.stream, &self.limits);
-        let decoded = without_panic_message(|| stream.picture(access_unit, limits));
-        let picture =
+        let decoded = without_panic_message(|| stream.frame(access_unit, limits));
+        let frame =
             decoded.unwrap_or_else(|| Err(unreadable("the video decoder failed: please report it with the log")));
-        match picture {
+        match frame {
             Ok(image) => {
                 self.synchronized = true;
                 check_resolution([image.width, image.height], &self.limits, expected_px)?;
@@ -102,10 +102,10 @@ impl VideoDecoder {
 
 impl Stream {
     /// Decodes the only frame of a message.
-    fn picture(&mut self, access_unit: &[u8], limits: &LogLimits) -> Result<GrayImage, ImageProblem> {
+    fn frame(&mut self, access_unit: &[u8], limits: &LogLimits) -> Result<GrayImage, ImageProblem> {
         match self {
             Self::H264(decoder, numbers) => {
-                let mut pictures = Vec::new();
+                let mut frames = Vec::new();
                 for unit in rust_h264::nal::parse_annex_b(access_unit) {
                     match unit.nal_unit_type {
                         NalUnitType::Sps => {
@@ -119,32 +119,30 @@ impl Stream {
                         }
                         _ => {}
                     }
-                    pictures.extend(decoder.decode_nal(&unit).map_err(damaged)?);
+                    frames.extend(decoder.decode_nal(&unit).map_err(damaged)?);
                 }
-                pictures.extend(decoder.flush());
-                let [picture] = one(pictures)?;
-                let (width, height) = (picture.width as usize, picture.height as usize);
-                let pixels = if picture.bit_depth > 8 {
+                frames.extend(decoder.flush());
+                let [frame] = one(frames)?;
+                let (width, height) = (frame.width as usize, frame.height as usize);
+                let pixels = if frame.bit_depth > 8 {
                     let sample = |pair: &[u8]| u16::from_le_bytes([pair[0], pair[1]]);
-                    picture.y.chunks_exact(2).map(|pair| narrowed(sample(pair), picture.bit_depth)).collect()
+                    frame.y.chunks_exact(2).map(|pair| narrowed(sample(pair), frame.bit_depth)).collect()
                 } else {
-                    picture.y
+                    frame.y
                 };
                 gray_image(width, height, pixels)
             }
             Self::H265(decoder) => {
-                let mut pictures = Vec::new();
+                let mut frames = Vec::new();
                 for unit in rust_h265::parse_annex_b(access_unit) {
-                    pictures.extend(decoder.decode_nal(&unit).map_err(damaged)?);
+                    frames.extend(decoder.decode_nal(&unit).map_err(damaged)?);
                 }
-                pictures.extend(std::iter::from_fn(|| decoder.flush()));
-                let [picture] = one(pictures)?;
-                let (width, height) = (picture.width as usize, picture.height as usize);
-                let pixels = match (picture.y.as_u8(), picture.y.as_u16()) {
+                frames.extend(std::iter::from_fn(|| decoder.flush()));
+                let [frame] = one(frames)?;
+                let (width, height) = (frame.width as usize, frame.height as usize);
+                let pixels = match (frame.y.as_u8(), frame.y.as_u16()) {
                     (Some(samples), _) => samples.to_vec(),
-                    (None, Some(samples)) => {
-                        samples.iter().map(|sample| narrowed(*sample, picture.bit_depth)).collect()
-                    }
+                    (None, Some(samples)) => samples.iter().map(|sample| narrowed(*sample, frame.bit_depth)).collect(),
                     (None, None) => Vec::new(),
                 };
                 gray_image(width, height, pixels)
@@ -157,9 +155,9 @@ fn damaged(error: impl std::fmt::Debug) -> ImageProblem {
     unreadable(format!("damaged video ({error:?})"))
 }
 
-fn one<T>(pictures: Vec<T>) -> Result<[T; 1], ImageProblem> {
-    <[T; 1]>::try_from(pictures)
-        .map_err(|pictures| unreadable(format!("{} frames in one message, expected 1", pictures.len())))
+fn one<T>(frames: Vec<T>) -> Result<[T; 1], ImageProblem> {
+    <[T; 1]>::try_from(frames)
+        .map_err(|frames| unreadable(format!("{} frames in one message, expected 1", frames.len())))
 }
 
 fn narrowed(sample: u16, bit_depth: u8) -> u8 {

@@ -1,12 +1,12 @@
 /// Profiles with additional fields in their sequence parameter sets (H.264, section 7.3.2.1.1).
 const HIGH_PROFILES: [u32; 13] = [100, 110, 122, 244, 44, 83, 86, 118, 128, 138, 139, 134, 135];
 
-/// Tracks `frame_num` of an H.264 stream: it grows by one after every reference picture, so that a lost one is
+/// Tracks `frame_num` of an H.264 stream: it grows by one after every reference frame, so that a lost one is
 /// detected.
 #[derive(Clone, Debug, Default)]
 pub(super) struct FrameNumbers {
     sequence: Option<Sequence>,
-    /// `frame_num` of the last reference picture.
+    /// `frame_num` of the last reference frame.
     reference: Option<u32>,
 }
 
@@ -24,7 +24,7 @@ impl FrameNumbers {
         self.sequence = sequence(payload);
     }
 
-    /// Reads the payload of a picture's first slice; the error means that a picture before it is missing.
+    /// Reads the payload of a frame's first slice; the error means that a frame before it is missing.
     pub(super) fn take_slice(&mut self, payload: &[u8], is_idr: bool, is_reference: bool) -> Result<(), String> {
         let Some(sequence) = self.sequence else { return Ok(()) };
         let mut bits = BitReader::new(payload);

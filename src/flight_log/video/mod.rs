@@ -5,12 +5,12 @@
 
 mod decoder;
 mod frame_numbers;
-mod picture_stream;
 #[cfg(test)]
 pub(super) mod tests;
+mod video_stream;
 
 pub(crate) use decoder::VideoDecoder;
-pub(crate) use picture_stream::{MissingPictures, PictureStream, missing_pictures};
+pub(crate) use video_stream::{MissingFrames, VideoStream, missing_frames};
 
 use super::FlightLog;
 use super::container::{BlockCache, TopicIndex};

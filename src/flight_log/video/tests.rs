@@ -52,7 +52,7 @@ fn codec_of(name: &str) -> VideoCodec {
 }
 
 #[test]
-fn pictures_are_those_of_ffmpeg() {
+fn frames_equal_the_ones_of_ffmpeg() {
     for name in ["h264", "h264_10_bit", "h264_b_frames", "h265"] {
         let stream = stream(name);
         let mut decoder = VideoDecoder::new(codec_of(name), &LogLimits::default());
@@ -110,7 +110,7 @@ fn a_lost_message_ends_a_group_of_pictures() {
 }
 
 #[test]
-fn sizes_are_checked_before_a_picture_is_decoded() {
+fn sizes_are_checked_before_a_frame_is_decoded() {
     let setting: LimitSetting = "image-pixels=6000".parse().unwrap();
     let limits = LogLimits { settings: vec![setting] };
     for name in ["h264", "h265"] {

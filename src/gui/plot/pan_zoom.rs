@@ -12,7 +12,7 @@ const MIN_BOX: f32 = 8.0;
 pub(in crate::gui) struct PanZoom {
     /// Size relative to the fitted size.
     pub(in crate::gui) zoom: f32,
-    /// Centre of the region as fractions of the picture's size.
+    /// Centre of the region as fractions of the size of the image.
     pub(in crate::gui) centre: Vec2,
 }
 
@@ -31,7 +31,7 @@ impl PanZoom {
     }
 
     /// The wheel and pinching zoom about the pointer, dragging and horizontal scrolling pan, a drag with the secondary
-    /// button zooms to a box, a double click fits the picture.
+    /// button zooms to a box, a double click fits the image.
     pub(in crate::gui) fn navigate(
         &mut self,
         ui: &Ui,

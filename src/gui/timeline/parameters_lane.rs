@@ -120,19 +120,19 @@ mod tests {
         for (name, size_px) in [(ThemeName::Dark, [1920, 700]), (ThemeName::Light, [1366, 600])] {
             let options = HeadlessOptions { size_px, pixels_per_point: 1.0, theme: name };
             let theme = Theme::of(name);
-            let picture = |brush_ns: Option<(i64, i64)>| {
+            let screenshot = |brush_ns: Option<(i64, i64)>| {
                 let mut panel = TimelinePanel::default();
                 (panel.parameters.open, panel.parameters.brush_ns) = (true, brush_ns);
-                let picture = draw(options, |ui| {
+                let screenshot = draw(options, |ui| {
                     theme.apply(ui.ctx());
                     let (mut images, mut selection) = (sample_images(), Selection::default());
                     with_context(&recording, end_ns, &mut images, &mut selection, &theme, |ctx| panel.ui(ui, ctx));
                 });
                 let brushed = if brush_ns.is_some() { "-stretch" } else { "" };
-                keep_screenshot(&format!("timeline-parameters-{}{brushed}", name.name()), &picture);
-                picture
+                keep_screenshot(&format!("timeline-parameters-{}{brushed}", name.name()), &screenshot);
+                screenshot
             };
-            assert!(picture(None) != picture(Some((end_ns / 2, end_ns))), "the stretch is shown");
+            assert!(screenshot(None) != screenshot(Some((end_ns / 2, end_ns))), "the stretch is shown");
         }
     }
 }

@@ -9,7 +9,7 @@ use super::survey::gradient_sums::ImageMeasure;
 use super::survey::{SampledImage, Survey};
 use crate::flight_log::FlightLog;
 use crate::flight_log::grey_levels::{GreyLevels, OUTSIDE_RATIO};
-use crate::flight_log::video::{MissingPictures, missing_pictures};
+use crate::flight_log::video::{MissingFrames, missing_frames};
 use crate::geometry::seconds_from_ns;
 use crate::sensors::{CameraMount, CameraRig, Rig};
 
@@ -231,7 +231,7 @@ pub(crate) fn check_video_decoding(log: &FlightLog, survey: &Survey, rig: &Rig, 
     for camera in &rig.cameras {
         let Some(info) = log.topic(&camera.topic) else { continue };
         let Some(kind) = info.kind.filter(|kind| kind.is_video()) else { continue };
-        let (read, missing) = missing_pictures(log, &camera.topic, kind, DECODED_MESSAGES);
+        let (read, missing) = missing_frames(log, &camera.topic, kind, DECODED_MESSAGES);
         let of = if read < info.count as usize { format!("the first {read}") } else { read.to_string() };
         let count: usize = missing.iter().map(|stretch| stretch.count).sum();
         if count == 0 {
@@ -240,7 +240,7 @@ pub(crate) fn check_video_decoding(log: &FlightLog, survey: &Survey, rig: &Rig, 
         }
         let times = survey.topics.get(&camera.topic).map_or(&[][..], |topic| topic.times.as_slice());
         let second = |number: usize| times.get(number).map_or(0.0, |times| seconds_from_ns(times.stamp_ns));
-        let listed = |stretch: &MissingPictures| {
+        let listed = |stretch: &MissingFrames| {
             let (from_s, to_s) = (second(stretch.first), second(stretch.first + stretch.count - 1));
             format!("{} from {from_s:.3} to {to_s:.3} s ({})", stretch.count, stretch.problem)
         };

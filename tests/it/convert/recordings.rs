@@ -247,11 +247,11 @@ fn movies_with_telemetry_are_converted() {
         let bytes = movie(&[video(name), telemetry_track(telemetry(6, axes))], tables_first);
         let (report, messages) = run(folder.path(), "flight.mp4", &bytes);
         let start_ns = START_UTC_S as i64 * 1_000_000_000;
-        let pictures = &messages["/camera/video"];
-        let stamps: Vec<i64> = pictures.iter().map(|(stamp_ns, _, _)| (stamp_ns - start_ns) / MS).collect();
+        let frames = &messages["/camera/video"];
+        let stamps: Vec<i64> = frames.iter().map(|(stamp_ns, _, _)| (stamp_ns - start_ns) / MS).collect();
         let expected: Vec<i64> = stream(name).1.iter().map(|place| 50 * *place as i64).collect();
         assert_eq!(stamps, expected, "{name}");
-        assert!(pictures.iter().all(|(stamp_ns, log_time_ns, _)| log_time_ns >= stamp_ns));
+        assert!(frames.iter().all(|(stamp_ns, log_time_ns, _)| log_time_ns >= stamp_ns));
         let reason = topic(&report, "/camera/video").reason.clone().unwrap();
         assert!(reason.starts_with("h264, 96×64, 20.00 fps"), "{reason}");
         assert_eq!(reason.contains("B-frames"), name != "h264");
@@ -341,9 +341,9 @@ fn damaged_movies_are_named() {
     let whole = movie(&tracks(), true);
     let (report, messages) = run(folder.path(), "flight.mp4", &whole[..whole.len() - 7000]);
     let lost = report.notes.iter().find(|note| note.contains("frames are lost: beyond the end")).cloned();
-    let pictures = messages["/camera/video"].len();
-    assert_eq!(lost.map(|note| note.starts_with(&format!("{} of 24 ", 24 - pictures))), Some(true), "{pictures}");
-    assert!(pictures > 0 && !messages.contains_key("/camera/imu/gyroscope"));
+    let frames = messages["/camera/video"].len();
+    assert_eq!(lost.map(|note| note.starts_with(&format!("{} of 24 ", 24 - frames))), Some(true), "{frames}");
+    assert!(frames > 0 && !messages.contains_key("/camera/imu/gyroscope"));
     // A movie without a video, and one with another compression.
     assert!(error(&movie(&tracks()[1..], true)).contains("has no video track"));
     let mut other = video("h264");

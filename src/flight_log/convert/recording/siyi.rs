@@ -36,7 +36,7 @@ pub(super) fn read(subtitles: &[Payload], video: &Video) -> Option<Recorded> {
             continue;
         };
         count += 1;
-        let frame_ns = video.pictures.get(subtitle.frame).map(|picture| picture.presented_ns);
+        let frame_ns = video.frames.get(subtitle.frame).map(|frame| frame.presented_ns);
         let Some(time_ns) =
             frame_ns.filter(|at| at.saturating_sub(payload.start_ns).saturating_abs() <= MAX_DISTANCE_NS)
         else {

@@ -40,7 +40,7 @@ enum Content {
     Rotation(UnitQuaternion<f64>),
     Pose(RigidTransform),
     /// Video frame with this number.
-    Picture(usize),
+    VideoFrame(usize),
 }
 
 /// Message with its header stamp and its log time.
@@ -258,13 +258,13 @@ impl Topics {
     /// Adds the frames of a video; `time_of` converts video time to log time.
     pub(super) fn add_video(&mut self, video: &Video, time_of: impl Fn(i64) -> i64) {
         let messages: Vec<Message> = video
-            .pictures
+            .frames
             .iter()
             .enumerate()
-            .map(|(number, picture)| Message {
-                stamp_ns: time_of(picture.presented_ns),
-                log_time_ns: time_of(picture.decoded_ns),
-                content: Content::Picture(number),
+            .map(|(number, frame)| Message {
+                stamp_ns: time_of(frame.presented_ns),
+                log_time_ns: time_of(frame.decoded_ns),
+                content: Content::VideoFrame(number),
             })
             .collect();
         self.topics.push(Topic {
@@ -316,7 +316,7 @@ fn write_message(
         Content::Imu([rate, force]) => sink.writer.write_imu(name, frame_id, times, rate, force)?,
         Content::Rotation(rotation) => sink.writer.write_rotation(name, frame_id, times, rotation)?,
         Content::Pose(pose) => sink.writer.write_pose(name, frame_id, times, pose)?,
-        Content::Picture(number) => {
+        Content::VideoFrame(number) => {
             let Some(video) = video else { return Ok(()) };
             match video.access_unit(*number) {
                 Ok(data) => sink.writer.write_compressed_video(name, frame_id, times, video.codec.name(), &data)?,

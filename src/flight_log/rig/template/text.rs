@@ -70,7 +70,7 @@ fn with_whole_numbers(line: &str) -> String {
     let Some((head, row)) = line.split_once("- [") else { return line.to_owned() };
     let Some(row) = row.strip_suffix(']') else { return line.to_owned() };
     let number = |text: &str| match text.parse::<f64>() {
-        // Adding zero turns −0 into 0.
+        // Adding zero converts −0 to 0.
         Ok(value) if (value - value.round()).abs() < ROUNDING => format!("{:?}", value.round() + 0.0),
         _ => text.to_owned(),
     };

@@ -25,12 +25,12 @@ const EPOCH_1904_S: u64 = 2_082_844_800;
 
 /// Number of frames without a message of users after which none is expected.
 const SEARCHED_FRAMES: usize = 300;
-/// Number of bytes at the start of a frame in which messages of users are searched: they come before the picture.
+/// Number of bytes at the start of a frame in which messages of users are searched: they come before its slices.
 const SEARCHED_BYTES: usize = 16_384;
 
 /// Frame of a video.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Picture {
+pub(super) struct VideoFrame {
     /// Time of exposure, in nanoseconds since the start of the video.
     pub(super) presented_ns: i64,
     /// Time of the message in the log: in the order of decoding, never before the exposure.
@@ -45,8 +45,8 @@ pub(super) struct Video {
     format: UnitFormat,
     pub(super) codec: VideoCodec,
     pub(super) resolution_px: [usize; 2],
-    pub(super) pictures: Vec<Picture>,
-    has_reordered_pictures: bool,
+    pub(super) frames: Vec<VideoFrame>,
+    has_reordered_frames: bool,
 }
 
 /// Payload of a telemetry sample with its time.
@@ -114,8 +114,8 @@ pub(super) fn open(path: &Path, limits: &LogLimits) -> Result<Movie, ConvertErro
         [(b"gpmd", "telemetry"), (b"camm", "camera motion metadata"), (b"tx3g", "subtitles")]
             .map(|(kind, name)| payloads(&tracks, kind, name, &file, &mut notes));
     let (track, format, resolution_px) = video_track(&tracks).map_err(unreadable)?;
-    let (pictures, has_reordered_pictures) = pictures(track, file.len(), &mut notes);
-    if pictures.is_empty() {
+    let (frames, has_reordered_frames) = frames(track, file.len(), &mut notes);
+    if frames.is_empty() {
         return Err(unreadable(format!("the video has no frame within the file; {}", notes.join("; "))));
     }
     if !track.is_upright {
@@ -125,7 +125,7 @@ pub(super) fn open(path: &Path, limits: &LogLimits) -> Result<Movie, ConvertErro
         notes.push(format!("the video has an edit list of {} parts; only its first time is applied", track.edits));
     }
     let codec = format.codec;
-    let video = Video { file, format, codec, resolution_px, pictures, has_reordered_pictures };
+    let video = Video { file, format, codec, resolution_px, frames, has_reordered_frames };
     let created_ns = created_s.and_then(|created_s| created_s.checked_mul(1_000_000_000));
     Ok(Movie { video, telemetry, motion, subtitles, created_ns, firmware, notes })
 }
@@ -159,13 +159,13 @@ fn video_track<'a>(tracks: &'a [MovieTrack<'a>]) -> Result<(&'a MovieTrack<'a>, 
     })
 }
 
-/// The pictures that lie in the file, and whether they are shown in another order than decoded.
-fn pictures(track: &MovieTrack<'_>, file_bytes: usize, notes: &mut Vec<String>) -> (Vec<Picture>, bool) {
+/// The frames that lie in the file, and whether they are shown in another order than decoded.
+fn frames(track: &MovieTrack<'_>, file_bytes: usize, notes: &mut Vec<String>) -> (Vec<VideoFrame>, bool) {
     // Frames that depend on later ones are written when the last of these is decoded.
     let delay_ns = track.samples.iter().map(|sample| sample.presented_ns.saturating_sub(sample.decoded_ns)).max();
     let delay_ns = delay_ns.unwrap_or(0);
     let mut lost = track.undescribed;
-    let mut pictures = Vec::with_capacity(track.samples.len());
+    let mut frames = Vec::with_capacity(track.samples.len());
     // Frames do not overlap: together they cannot be longer than the file.
     let mut budget = file_bytes;
     for sample in &track.samples {
@@ -173,7 +173,7 @@ fn pictures(track: &MovieTrack<'_>, file_bytes: usize, notes: &mut Vec<String>) 
             Some((start, length)) => {
                 budget -= length;
                 let decoded_ns = sample.decoded_ns.saturating_add(delay_ns);
-                pictures.push(Picture { presented_ns: sample.presented_ns, decoded_ns, start, length });
+                frames.push(VideoFrame { presented_ns: sample.presented_ns, decoded_ns, start, length });
             }
             None => lost += 1,
         }
@@ -182,8 +182,8 @@ fn pictures(track: &MovieTrack<'_>, file_bytes: usize, notes: &mut Vec<String>) 
         let all = track.samples.len() as u64 + track.undescribed;
         notes.push(format!("{lost} of {all} frames are lost: beyond the end of the file (truncated) or not described"));
     }
-    let reordered = pictures.windows(2).any(|pair| pair[1].presented_ns < pair[0].presented_ns);
-    (pictures, reordered)
+    let reordered = frames.windows(2).any(|pair| pair[1].presented_ns < pair[0].presented_ns);
+    (frames, reordered)
 }
 
 /// Position and length of a sample that lies in the file.
@@ -253,7 +253,7 @@ fn payloads(
 impl Video {
     /// Frame in Annex B.
     pub(super) fn access_unit(&self, number: usize) -> Result<Vec<u8>, String> {
-        let Picture { start, length, .. } = self.pictures[number];
+        let VideoFrame { start, length, .. } = self.frames[number];
         self.format.access_unit(&self.file.read(start..start + length)?)
     }
 
@@ -261,21 +261,21 @@ impl Video {
     /// (`user_data_unregistered`), in the order of the frames; the search ends after many frames without one.
     pub(super) fn each_message(&self, uuid: [u8; 16], mut take: impl FnMut(i64, &[u8])) {
         let mut found = 0_usize;
-        for (number, picture) in self.pictures.iter().enumerate() {
+        for (number, frame) in self.frames.iter().enumerate() {
             if found == 0 && number >= SEARCHED_FRAMES {
                 return;
             }
-            let length = picture.length.min(SEARCHED_BYTES);
-            let Ok(start) = self.file.read(picture.start..picture.start + length) else { continue };
+            let length = frame.length.min(SEARCHED_BYTES);
+            let Ok(start) = self.file.read(frame.start..frame.start + length) else { continue };
             for unit in self.format.units(&start).map_while(Result::ok) {
                 match sei_unit(self.codec, unit[0]) {
                     SeiUnit::Messages { header_bytes } => {
                         for content in unregistered(unit, header_bytes, uuid) {
                             found += 1;
-                            take(picture.presented_ns, &content);
+                            take(frame.presented_ns, &content);
                         }
                     }
-                    SeiUnit::Picture => break,
+                    SeiUnit::Slice => break,
                     SeiUnit::Other => {}
                 }
             }
@@ -284,15 +284,15 @@ impl Video {
 
     /// Description such as `h264, 854×480, 29.97 fps`.
     pub(super) fn description(&self) -> String {
-        let times: Samples<()> = self.pictures.iter().map(|picture| (picture.decoded_ns, ())).collect();
+        let times: Samples<()> = self.frames.iter().map(|frame| (frame.decoded_ns, ())).collect();
         let [width, height] = self.resolution_px;
-        let order = if self.has_reordered_pictures { "; with B-frames, in the order of decoding" } else { "" };
+        let order = if self.has_reordered_frames { "; with B-frames, in the order of decoding" } else { "" };
         format!("{}, {width}×{height}, {:.2} fps{order}", self.codec.name(), rate_hz(&times))
     }
 
     /// First and last time of the frames in nanoseconds since the start of the video.
     pub(super) fn span_ns(&self) -> (i64, i64) {
-        let times = || self.pictures.iter().map(|picture| picture.presented_ns);
+        let times = || self.frames.iter().map(|frame| frame.presented_ns);
         (times().min().unwrap_or(0), times().max().unwrap_or(0))
     }
 }

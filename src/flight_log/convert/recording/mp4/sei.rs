@@ -10,12 +10,12 @@ const UUID_BYTES: usize = 16;
 /// Role of a unit for the search of messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum SeiUnit {
-    /// Messages for the picture that follows, with the size of the unit's header.
+    /// Messages for the frame that follows, with the size of the unit's header.
     Messages {
         header_bytes: usize,
     },
-    /// Part of the picture itself: messages come before it.
-    Picture,
+    /// Slice of the frame itself: messages come before it.
+    Slice,
     Other,
 }
 
@@ -23,7 +23,7 @@ pub(super) fn sei_unit(codec: VideoCodec, header: u8) -> SeiUnit {
     match (codec, header & 0x1F, header >> 1 & 0x3F) {
         (VideoCodec::H264, 6, _) => SeiUnit::Messages { header_bytes: 1 },
         (VideoCodec::H265, _, 39) => SeiUnit::Messages { header_bytes: 2 },
-        (VideoCodec::H264, 1..=5, _) | (VideoCodec::H265, _, 0..=31) => SeiUnit::Picture,
+        (VideoCodec::H264, 1..=5, _) | (VideoCodec::H265, _, 0..=31) => SeiUnit::Slice,
         _ => SeiUnit::Other,
     }
 }
@@ -116,7 +116,7 @@ mod tests {
         assert_eq!(without_emulation(&[0, 0, 3, 1, 0, 0, 3, 0, 0, 3, 3]), [0, 0, 1, 0, 0, 0, 0, 3]);
         assert_eq!(without_emulation(&[0, 3, 0, 0]), [0, 3, 0, 0]);
         assert_eq!(sei_unit(VideoCodec::H265, 39 << 1), SeiUnit::Messages { header_bytes: 2 });
-        assert_eq!(sei_unit(VideoCodec::H264, 0x65), SeiUnit::Picture);
+        assert_eq!(sei_unit(VideoCodec::H264, 0x65), SeiUnit::Slice);
         assert_eq!(sei_unit(VideoCodec::H264, 0x67), SeiUnit::Other);
     }
 }

@@ -35,7 +35,7 @@ const RIGID_RAD_PER_S: f64 = 0.05;
 const RIGID_RATIO: f64 = 0.2;
 
 /// True if the camera rotates relative to the vehicle, false if both IMUs are on one body; `None` if they rotate too little
-/// or overlap too briefly to tell. Both have the times of the log.
+/// or overlap too briefly. Both have the times of the log.
 pub(in crate::flight_log::convert::recording) fn camera_moves(
     vehicle: &RecordedImu,
     camera: &RecordedImu,

@@ -11,13 +11,13 @@ use crate::sensors::GrayImage;
 ///
 /// After a missing or unreadable message, or one of another compression, frames are rejected up to the next keyframe.
 #[derive(Debug, Default)]
-pub(crate) struct PictureStream {
+pub(crate) struct VideoStream {
     decoder: Option<VideoDecoder>,
     /// Number of the message after the last decoded one.
     next: usize,
 }
 
-impl PictureStream {
+impl VideoStream {
     /// Number of the message that continues the stream, `None` if only a keyframe can.
     pub(crate) fn next(&self) -> Option<usize> {
         self.decoder.is_some().then_some(self.next)
@@ -49,7 +49,7 @@ impl PictureStream {
 
 /// Consecutive messages of a video whose frames cannot be decoded.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct MissingPictures {
+pub(crate) struct MissingFrames {
     /// Number of the first message.
     pub(crate) first: usize,
     pub(crate) count: usize,
@@ -59,16 +59,16 @@ pub(crate) struct MissingPictures {
 
 /// Decodes the first `most` messages of a video topic. Returns the number of messages, and the stretches without
 /// frames.
-pub(crate) fn missing_pictures(
+pub(crate) fn missing_frames(
     log: &FlightLog,
     topic: &str,
     kind: MessageKind,
     most: usize,
-) -> (usize, Vec<MissingPictures>) {
+) -> (usize, Vec<MissingFrames>) {
     let mut cache = BlockCache::new(BLOCKS);
     let mut messages = log.topic_index(topic);
-    let mut stream = PictureStream::default();
-    let mut missing: Vec<MissingPictures> = Vec::new();
+    let mut stream = VideoStream::default();
+    let mut missing: Vec<MissingFrames> = Vec::new();
     let mut read = 0;
     while read < most
         && let Some(position) = messages.get(log.index(), log.file(), read)
@@ -87,7 +87,7 @@ pub(crate) fn missing_pictures(
         let Err(problem) = decoded else { continue };
         match missing.last_mut().filter(|stretch| stretch.first + stretch.count == number) {
             Some(stretch) => stretch.count += 1,
-            None => missing.push(MissingPictures { first: number, count: 1, problem }),
+            None => missing.push(MissingFrames { first: number, count: 1, problem }),
         }
     }
     (read, missing)
