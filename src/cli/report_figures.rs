@@ -41,7 +41,8 @@ impl Wanted {
     }
 }
 
-/// The figures of a report: of the whole log, then of each stamp (without one, of the end).
+/// Draws the figures of a report: figures of the whole log, then figures at each of the times `at_s` in seconds, or at the
+/// end of the log without any.
 pub(crate) fn draw(at_s: &[f64], plan: &SessionPlan, computation: &mut Computation) -> Result<Vec<ReportFigure>> {
     let mut images = ImageReader::new(Arc::clone(&plan.log), &plan.rig);
     let end_ns = computation.recording().last_stamp_ns();

@@ -93,7 +93,7 @@ impl Display for PlanReport {
     }
 }
 
-/// Checks that a plan may be written into a folder: existing files of a plan must be of the same rig.
+/// Checks that a plan may be written into a folder: existing files of a plan must belong to the same rig.
 ///
 /// # Errors
 /// If the folder cannot be written or, without `force`, contains another plan or files of the same names.

@@ -148,7 +148,7 @@ impl ParameterId {
         }
     }
 
-    /// Shown unit: that of the dimension, or percent for scale and misalignment of the IMU.
+    /// Shown unit: the unit of the dimension, or percent for scale and misalignment of the IMU.
     pub const fn shown(self) -> Shown {
         match (self.group(), self.dimension()) {
             (ParameterGroup::Imu, Dimension::Ratio) => Shown { factor: 100.0, unit: " %" },

@@ -15,7 +15,7 @@ pub(crate) fn look_of(verdict: Determination, theme: &Theme) -> (&'static str, C
 pub(crate) const LEVELS: u8 = 8;
 
 /// Level of a cell in a map of σ over prior σ: 0 without a value, then from the smallest ratio to the largest, in steps
-/// that begin at the limits of the scale; the last one is that of redundant parameters.
+/// that begin at the limits of the scale; redundant parameters have the last one.
 pub(crate) fn level_of(verdict: Determination, ratio: f32) -> u8 {
     let ratio = f64::from(ratio);
     match verdict {

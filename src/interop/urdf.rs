@@ -118,7 +118,7 @@ fn add_gimbal(text: &mut String, gimbal: &GimbalRig) -> (String, RigidTransform)
 
 fn origin(pose: &RigidTransform) -> String {
     let numbers = |values: &[f64]| {
-        // Adding zero turns −0 into 0.
+        // Adding zero converts −0 to 0.
         values.iter().map(|value| format!("{}", value + 0.0)).collect::<Vec<_>>().join(" ")
     };
     let (xyz, rpy) = (numbers(pose.translation_m.as_slice()), numbers(&roll_pitch_yaw(&pose.rotation)));

@@ -40,7 +40,7 @@ impl ScalingRule {
 /// is not finite.
 ///
 /// With the calibration columns `J_c` of the whitened rows, their scales D, and N whose rows span the complement of all
-/// other columns, the ranks are those of `N J_c D` with the singular values s (docs/mathematics.md, section 8):
+/// other columns, the ranks of `N J_c D` count its singular values s (docs/mathematics.md, section 8):
 ///
 /// ```text
 /// structural: s > 100 ε max(rows, columns) ‖J_c D‖    informed: s ≥ 1

@@ -1,5 +1,5 @@
 //! Observability of single parameters in a window, from the null and uninformed directions of its step, and the motions
-//! that determine those of sensors.
+//! that determine the parameters of sensors.
 
 use std::collections::BTreeMap;
 

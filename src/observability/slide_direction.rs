@@ -24,7 +24,7 @@ pub enum SlideDirection {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SlidePosition {
     pub direction: SlideDirection,
-    /// Amount in units of 10° and 3 cm along the unit direction.
+    /// Length of the slide along the unit direction, in units of 10° and 3 cm.
     pub amount: f64,
 }
 
@@ -33,7 +33,7 @@ pub struct SlidePosition {
 pub struct SlideRequest {
     /// Number of a measured direction, counted from 1, name of a closed-form one, or parameter.
     pub direction: String,
-    /// Amount in units of 10° and 3 cm along the unit direction.
+    /// Length of the slide along the unit direction, in units of 10° and 3 cm.
     pub amount: f64,
 }
 

@@ -25,7 +25,7 @@ impl<D: Dim> NormalEquations<D>
 where
     DefaultAllocator: Allocator<D> + Allocator<D, D>,
 {
-    /// Equations without rows.
+    /// Equations before any row is added: H and g are zero.
     pub(crate) fn zeros(unknowns: D) -> Self {
         Self {
             hessian: OMatrix::zeros_generic(unknowns, unknowns),

@@ -84,7 +84,7 @@ pub(crate) struct ReprojectionEquations<P: PoseEquations> {
 /// Equations of the camera poses after elimination of the landmarks.
 #[derive(Clone, Debug)]
 pub(crate) struct ReducedEquations<P> {
-    /// Reduced Hessian and gradient.
+    /// Hessian and gradient of the poses, reduced by the landmarks: `H_pp − H_pl H_ll⁻¹ H_lp`, `g_p − H_pl H_ll⁻¹ g_l`.
     pub(crate) poses: P,
     /// Inverse of each landmark's damped block, for the substitution.
     inverses: Vec<Matrix3<f64>>,

@@ -23,7 +23,7 @@ pub(crate) struct GroupEquations {
 
 #[derive(Clone, Debug)]
 pub(crate) struct TwoLevelEquations {
-    /// `H_cc`, `g_c`.
+    /// `H_cc` and `g_c` of the common unknowns.
     pub(crate) common: NormalEquations<Dyn>,
     pub(crate) groups: Vec<GroupEquations>,
 }

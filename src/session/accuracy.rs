@@ -197,11 +197,11 @@ pub fn absolute_errors_m(pairs: &[(StampedPose, StampedPose)], transform: &Align
         .collect()
 }
 
-/// Smallest net turn over which a drift of the heading is stated, in radians.
+/// Smallest net rotation over which a drift of the heading is stated, in radians.
 const MIN_TURN_RAD: f64 = std::f64::consts::PI;
 
-/// Heading error gained per full turn of the vehicle, in radians: positive if the estimate turns too far, negative if it
-/// lags behind. `None` if the net turn is less than half a turn.
+/// Heading error gained per revolution of the vehicle, in radians: positive if the estimate rotates too far, negative if
+/// it lags behind. `None` if the net rotation is less than half a revolution.
 pub fn heading_drift_rad(pairs: &[(StampedPose, StampedPose)]) -> Option<f64> {
     let mut turned_rad = 0.0;
     let mut error_rad = 0.0;

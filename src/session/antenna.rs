@@ -117,7 +117,8 @@ pub fn antenna_errors_m(pairs: &[AntennaPair], alignment: &AntennaAlignment) -> 
     pairs.iter().map(|pair| residual(pair, &alignment.true_from_estimate, &alignment.lever_arm_m).norm()).collect()
 }
 
-/// Statistics of these distances, and the length of the antenna's path in metres.
+/// Statistics of [`antenna_errors_m`] in metres, and the length of the true path of the antenna in metres; `None` without
+/// pairs.
 pub fn antenna_statistics(pairs: &[AntennaPair], alignment: &AntennaAlignment) -> Option<(ErrorStatistics, f64)> {
     let statistics = ErrorStatistics::of(&antenna_errors_m(pairs, alignment))?;
     Some((statistics, path_length_m(pairs.iter().map(|pair| &pair.antenna_m))))

@@ -25,7 +25,7 @@ impl Aim {
         self.swing_rad * pace.liveliness(time_s) * phase.sin()
     }
 
-    /// Heading from a position to what there is to see, by whole turns nearest to `near_rad`, the direction of the route.
+    /// Heading from a position to what there is to see, by whole revolutions nearest to `near_rad`, the direction of the route.
     pub(crate) fn direction_rad(&self, position_m: &Vector3<f64>, near_rad: f64) -> f64 {
         let Some(target_m) = self.target_m else { return near_rad };
         let to_target = target_m - position_m.xy();

@@ -36,7 +36,8 @@ pub struct Vibration {
     pub rotor_hz: f64,
     /// Amplitude of the angular rate at that frequency before the sensor's filter, root sum square over the rotors, in rad/s.
     pub rate_rad_per_s: f64,
-    /// Amplitude of the specific force, likewise, in m/s².
+    /// Amplitude of the specific force at that frequency before the sensor's filter, root sum square over the rotors, in
+    /// m/s².
     pub force_m_per_s2: f64,
 }
 

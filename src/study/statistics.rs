@@ -7,9 +7,9 @@ use crate::geometry::t_quantile;
 pub struct MeanInterval {
     pub pairs: usize,
     pub mean: f64,
-    /// Lower end of the two-sided 95 % interval of the mean.
+    /// Lower limit of the two-sided 95 % interval of the mean.
     pub low: f64,
-    /// Upper end of that interval.
+    /// Upper limit of the same interval.
     pub high: f64,
 }
 

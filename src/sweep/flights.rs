@@ -113,7 +113,7 @@ fn remove_leftovers(folder: &Path, prefix: &str) {
     }
 }
 
-/// Reason why a flight could not be rendered.
+/// Error of rendering a flight.
 #[derive(Debug, thiserror::Error)]
 pub enum FlightError {
     /// The simulation failed or was interrupted.

@@ -1,4 +1,4 @@
-//! Values of cells.
+//! Values of the cells of a table, and the types of its columns.
 
 use std::cmp::Ordering;
 use std::fmt;
@@ -7,9 +7,9 @@ use crate::geometry::seconds_from_ns;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum ColumnType {
-    /// 64-bit floating point.
+    /// Number with 64-bit floating point.
     Number,
-    /// 64-bit signed integer.
+    /// Whole number, 64-bit signed.
     Integer,
     Text,
     Bool,

@@ -107,7 +107,7 @@ impl<'a, Row> Column<'a, Row> {
         }
     }
 
-    /// A column of files whose values differ between two machines with equal results.
+    /// A column whose values depend on the machine, such as times; comparisons of results omit it.
     pub fn local<Value: CellValue>(name: impl Into<Cow<'a, str>>, value: impl Fn(&Row) -> Value + 'a) -> Self {
         Self { local: true, ..Self::new(name, value) }
     }

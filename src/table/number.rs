@@ -67,7 +67,7 @@ impl Shown {
         Self { factor, unit }
     }
 
-    /// A stored value with its unit; its precision is that of two digits of the standard deviation.
+    /// A stored value with its unit, to the decimal of the second digit of its standard deviation.
     pub fn value(self, stored: f64, stored_sigma: f64) -> String {
         format!("{}{}", fixed(stored * self.factor, decimals_for(stored_sigma * self.factor)), self.unit)
     }

@@ -9,9 +9,9 @@ pub const FINITE: RangeInclusive<f64> = f64::MIN..=f64::MAX;
 /// `KEY=VALUE`, split at its first equals sign.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Entry<'a> {
-    /// Text before the equals sign.
+    /// Text before the first equals sign, as written.
     pub key: &'a str,
-    /// Text behind the equals sign.
+    /// Text behind the first equals sign, as written.
     pub value: &'a str,
 }
 

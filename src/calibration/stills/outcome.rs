@@ -176,7 +176,7 @@ impl StillsCorrelations {
 pub struct StillsOutcome {
     pub configuration: String,
     pub joints: Vec<String>,
-    /// Use of the readings; `None` if a given chain was judged.
+    /// Model of the readings in the fit; `None` if a given chain was judged.
     pub angles: Option<AngleModel>,
     pub stations: usize,
     pub floors: Vec<CameraFloor>,
@@ -187,7 +187,7 @@ pub struct StillsOutcome {
     pub axes: Vec<AxisAngle>,
     /// Parameterization in which the chain is reported first, minimal and far from its singularities.
     pub parameterization: &'static str,
-    /// Chain in every parameterization, the one above first.
+    /// Chain in every parameterization, the reported one first.
     pub tables: Vec<ParameterTable>,
     /// Transforms between the rigid cameras.
     pub rigid: Vec<StillsParameter>,

@@ -16,7 +16,7 @@ use crate::optimization::{NormalEquations, gauss_newton};
 const VISUAL_ROTATION_SIGMA_RAD: f64 = 0.002;
 /// Typical distance of landmarks before the scale is known.
 const FIRST_DISTANCE_M: f64 = 8.0;
-/// Error of a gyroscope rotation over the window; it turns gravity into a spurious acceleration.
+/// Error of a gyroscope rotation over the window; it rotates gravity into a spurious acceleration.
 const TILT_SIGMA_RAD: f64 = 0.003;
 /// Iterations of the linear system; the second and later ones also estimate the rotation of the extrinsics.
 const ROUNDS: usize = 5;

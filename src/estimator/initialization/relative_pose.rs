@@ -35,7 +35,7 @@ type BearingPair = (Vector3<f64>, Vector3<f64>);
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RotationPrior {
     pub rotation: UnitQuaternion<f64>,
-    /// Standard deviation about each axis.
+    /// Standard deviation of the rotation about each axis, in radians.
     pub sigma_rad: f64,
 }
 

@@ -60,8 +60,8 @@ pub(crate) struct NormalEquations {
 }
 
 impl Problem<'_> {
-    /// Values at which derivatives are evaluated, without landmarks: first estimates where a state is near enough to its
-    /// own, and for the calibration if configured, else those of `estimate`.
+    /// Values at which derivatives are evaluated, without landmarks: the first estimate of a state that is near enough to
+    /// it, and of the calibration if configured; otherwise the values of `estimate`.
     pub(crate) fn linearization_point(&self, estimate: &Estimate) -> Estimate {
         let frames = self.frames.iter().zip(&estimate.frames);
         let reach_rad = self.first_estimate_reach_rad;

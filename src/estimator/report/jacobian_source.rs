@@ -208,7 +208,7 @@ impl JacobianSource {
         self.frames.chunks_exact(POSE_NUMBERS + joints).map(unpacked).collect()
     }
 
-    /// Packed rows; `numbers` are the frames by slot.
+    /// Rows of the packed Jacobian in their order; `numbers[slot]` is the frame of a slot.
     pub(crate) fn rows<'a>(&'a self, numbers: &'a [FrameId]) -> impl Iterator<Item = JacobianRow> + 'a {
         let mut begin = 0;
         self.rows.iter().filter_map(move |row| {

@@ -403,7 +403,7 @@ impl Preintegration {
 /// constant change of ω and of a over the interval, and by the rotation φ of the increment before it.
 struct SampleStep {
     h: f64,
-    /// `E = Exp(φ)`.
+    /// Rotation over the interval, `E = Exp(φ)`.
     rotation: UnitQuaternion<f64>,
     e_transpose: Matrix3<f64>,
     /// `ΔR` before the interval.

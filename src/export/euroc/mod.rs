@@ -26,7 +26,7 @@ use crate::text::log_name;
 /// Folder of the sensors.
 const SENSORS: &str = "mav0";
 
-/// Checks that a log may be written as `mav0` into a folder: an existing one must be of the same log.
+/// Checks that a log may be written as `mav0` into a folder: an existing `mav0` must come from the same log.
 ///
 /// # Errors
 /// If the folder cannot be written or, without `force`, has another `mav0`.

@@ -29,7 +29,7 @@ const RANK: [&str; 9] = [
     "informed_threshold",
 ];
 
-/// Columns of all rows.
+/// Columns of the series of a run, in the order of its rows' cells.
 pub(super) struct Series<'a> {
     /// Parameters of all parameterizations of the run, each with its σ.
     parameters: Vec<StepColumn<'a>>,

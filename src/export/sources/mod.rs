@@ -31,7 +31,7 @@ const TRUTH_ENDING: &str = ".truth.yaml";
 pub struct LogSources {
     /// The flight log, or the recording that is converted into one.
     pub main: PathBuf,
-    /// `None` for a flight log or a saved session, which need no conversion.
+    /// Format of the recording; `None` for a flight log or a saved session, which need no conversion.
     pub kind: Option<SourceKind>,
     /// Bags that continue a ROS 1 bag, in the order of the numbers in their names.
     pub splits: Vec<PathBuf>,

@@ -26,7 +26,7 @@ pub(crate) struct Field<'a> {
     value: Option<&'a Located>,
     /// Mapping that contains the field, or would contain it.
     parent: Option<&'a Located>,
-    /// Line of its key, for a missing field that of its mapping; 0 if unknown.
+    /// Line of its key, or of its mapping for a missing field; 0 if unknown.
     line: usize,
     file: &'a Path,
 }
@@ -142,7 +142,7 @@ impl<'a> Field<'a> {
         }
     }
 
-    /// Finite number.
+    /// Value as a finite number; otherwise an error that says what is `expected`.
     pub(crate) fn number(&self, expected: &str) -> Result<f64, FileError> {
         let number = self.value.and_then(Located::number).and_then(|number| number.value);
         number.ok_or_else(|| self.unexpected(expected))

@@ -17,7 +17,7 @@ const MAX_IMU_ERROR: f64 = 0.3;
 pub(crate) struct Shutter {
     /// Time in seconds from the first row to after the last one.
     pub(crate) readout_s: f64,
-    /// Standard deviation in seconds.
+    /// Standard deviation of `readout_s` in seconds; `None` if the rig states none.
     pub(crate) sigma_s: Option<f64>,
 }
 

@@ -172,6 +172,6 @@ fn smallest_rotation(from: &Vector3<f64>, to: &Vector3<f64>) -> UnitQuaternion<f
 
 /// Numbers as attributes: the shortest texts that give the same values.
 pub(super) fn numbers(values: &[f64]) -> String {
-    // Adding zero turns −0 into 0.
+    // Adding zero converts −0 to 0.
     values.iter().map(|value| format!("{}", value + 0.0)).collect::<Vec<_>>().join(" ")
 }

@@ -173,7 +173,7 @@ impl LinkPath<'_> {
         self.joints().map(|joint| Joint { name: joint.name.clone(), limits_rad: joint.limits_rad }).collect()
     }
 
-    /// Axis of a rotation in the frame in which it acts; the positive angle turns about it.
+    /// Axis of a rotation in the frame in which it acts; positive angles rotate about it, right-handed.
     pub(super) fn axis(&self, rotation: PathRotation) -> Vector3<f64> {
         let axis = self.model.joints[rotation.joint].axis;
         if rotation.reversed { -axis } else { axis }

@@ -1,7 +1,7 @@
 //! Laboratory panel: observability of the parameters for a mechanism, its parameterizations and a motion without a log,
 //! and a planned motion with the σ that it leaves.
 //!
-//! The experiments are those of `dcvins degeneracy`, the planned motions those of `dcvins plan`.
+//! `dcvins degeneracy` runs the same experiments, `dcvins plan` the same planned motions.
 
 mod choices;
 mod plan;
@@ -170,7 +170,7 @@ impl LaboratoryPanel {
     }
 }
 
-/// Colour of the run with this parameterization, else that of text: the columns are no runs.
+/// Colour of the run with this parameterization; the text colour without one, because the columns are no runs.
 fn color_of(form: &str, ctx: &PanelContext<'_>) -> Color32 {
     let run = ctx.recording.runs.iter().position(|run| run.spec.parameterization.name() == form);
     run.map_or(ctx.theme.text, |run| ctx.theme.run(run).color)

@@ -40,7 +40,7 @@ fn values(strips: &[StripPlot]) -> impl Iterator<Item = f64> {
     strips.iter().flat_map(|strip| strip.points.iter().map(|(_, value)| *value))
 }
 
-/// A unit after a number, with a space before all but degrees and percent signs.
+/// Unit as written after a number: with a space before it, except for degrees and percent.
 pub(super) fn spaced(unit: &str) -> String {
     match unit {
         "" | "°" => unit.to_owned(),

@@ -196,7 +196,7 @@ mod tests {
         }
         assert!(stretch.rows[0].by.is_some(), "{:?}", stretch.rows[0]);
         assert!(stretch.motion.contains("path ") && stretch.motion.contains(&joints[0]), "{}", stretch.motion);
-        // Before the first solve σ is that of the prior.
+        // Before the first solve the prior gives σ.
         let early = TimelineStretch::read(run, (0, range_ns.1), &joints).unwrap();
         assert!(early.rows.iter().all(|row| row.before == row.prior));
         assert!(TimelineStretch::read(run, (0, 1), &joints).is_none());

@@ -11,7 +11,8 @@ use crate::gui::units::counted;
 /// Number of letters of a copied value that its notice shows.
 const SHOWN_LETTERS: usize = 60;
 
-/// Value under the pointer: the one that a panel offers, or the text that is painted there.
+/// Text of the value under the pointer: the value that a panel offers, or the text that is painted there; `None` without
+/// either.
 pub(super) fn value_under_pointer(ui: &Ui) -> Option<String> {
     let pointer = ui.input(|input| input.pointer.hover_pos())?;
     let free = ui.ctx().layer_id_at(pointer) == Some(ui.layer_id());

@@ -59,8 +59,8 @@ pub(super) enum HandEyeOutcome {
     Other,
 }
 
-/// Checks the orientation and time offset of a camera with a readout by its image rotations, if there are any; a misfit
-/// beyond the noise is traced to its cause.
+/// Checks orientation and time offset of a camera by its image rotations, if there are any; its rows have the readout
+/// `readout_s`. A misfit beyond the noise is traced to its cause.
 pub(super) fn check_against_gyroscope(
     survey: &Survey,
     rig: &Rig,
@@ -322,7 +322,7 @@ fn tolerance_rad(fit: &RotationFit) -> f64 {
 /// other rotations.
 fn turned_images(orientation: &UnitQuaternion<f64>) -> Option<(&'static str, &'static str)> {
     const TURN: &str = "turn them upright in the driver, or turn T_cam_imu (T_E_C on a gimbal) about the optical axis";
-    // Rotations are axial vectors: those in an image mirrored at an axis are rotated by half a turn about the other one.
+    // Rotations are axial vectors: in an image mirrored at one axis they are rotated by 180° about the other one.
     const MIRROR: &str = "look at text in the images: mirror them back in the driver, or correct the extrinsics, by which \
                           the camera then looks backwards";
     let about = |axis: Vector3<f64>, angle_rad: f64| {

@@ -98,8 +98,8 @@ fn check_unit(gimbal: &GimbalRig, readings: &[Vec<(i64, f64)>], findings: &mut F
     findings.add(Severity::Error, Area::Encoders, title, evidence, remedy);
 }
 
-/// Time in seconds of the first step by more than half a turn between two readings.
-fn first_whole_turn_s(readings: &[(i64, f64)]) -> Option<f64> {
+/// Time in seconds of the first step by more than half a revolution between two readings.
+fn first_revolution_s(readings: &[(i64, f64)]) -> Option<f64> {
     let step = readings.windows(2).find(|pair| (pair[1].1 - pair[0].1).abs() > PI)?;
     Some(seconds_from_ns(step[1].0))
 }
@@ -163,7 +163,7 @@ fn check_joint(
     let has_turns = values.iter().all(|angle| is_within(turned(angle))) && !(is_within(low) && is_within(high));
     if has_turns {
         let title = format!("readings of '{name}' contain whole turns");
-        let since = first_whole_turn_s(&angles).map_or_else(String::new, |at_s| format!("; a step at {at_s:.2} s"));
+        let since = first_revolution_s(&angles).map_or_else(String::new, |at_s| format!("; a step at {at_s:.2} s"));
         let remedy = "the orientation is the same: nothing to do";
         findings.add(Severity::Note, Area::Encoders, title, format!("{range}{since}"), remedy);
     } else if low < lower - margin || high > upper + margin {

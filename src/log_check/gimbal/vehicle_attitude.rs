@@ -47,7 +47,7 @@ struct HeadingStep {
 /// Compares the attitude of the vehicle in the rig's `gimbal.source` with the gyroscope.
 pub(crate) fn check_vehicle_attitude(survey: &Survey, rig: &Rig, imu_facts: &ImuFacts, findings: &mut Findings) {
     let Some(source) = rig.gimbal.as_ref().and_then(|gimbal| gimbal.attitude.as_ref()) else { return };
-    // The heading of the vehicle cancels where the gimbal's is relative to it.
+    // The heading of the vehicle cancels where the gimbal's heading is relative to it.
     if matches!(source.frame, AttitudeFrame::Body | AttitudeFrame::Vehicle) {
         return;
     }

@@ -50,13 +50,13 @@ struct GroundTruth<'a> {
     poses: Vec<(i64, RigidTransform)>,
 }
 
-/// Compares the ground truth of the rig with the IMU, if the log has one with attitudes. `turns_of_imu` are rotations of
+/// Compares the ground truth of the rig with the IMU, if the log has one with attitudes. `rotations_of_imu` are rotations of
 /// the IMU, in its frame, that would explain the orientations of the cameras.
 pub(super) fn check_ground_truth(
     log: &FlightLog,
     rig: &Rig,
     imu_facts: &ImuFacts,
-    turns_of_imu: &[UnitQuaternion<f64>],
+    rotations_of_imu: &[UnitQuaternion<f64>],
     findings: &mut Findings,
 ) {
     if !findings.can_compare(Measurement::Gyroscope) {
@@ -75,7 +75,7 @@ pub(super) fn check_ground_truth(
     // Stamps of a batch are late by up to its length.
     let stamps = imu_facts.samples.iter().map(|sample| sample.stamp_ns);
     let batches = Spacing::of(stamps, Some(rig.imu.rate_hz)).batches;
-    truth.compare(imu_facts, batches.map_or(0.0, |batches| batches.pause_s), turns_of_imu, findings);
+    truth.compare(imu_facts, batches.map_or(0.0, |batches| batches.pause_s), rotations_of_imu, findings);
 }
 
 impl GroundTruth<'_> {
@@ -84,7 +84,7 @@ impl GroundTruth<'_> {
         &self,
         imu_facts: &ImuFacts,
         imu_delay_s: f64,
-        turns_of_imu: &[UnitQuaternion<f64>],
+        rotations_of_imu: &[UnitQuaternion<f64>],
         findings: &mut Findings,
     ) {
         let rotations = self.rotations();
@@ -104,7 +104,7 @@ impl GroundTruth<'_> {
             }
             Ok(found) => {
                 self.report_clock(&found, imu_delay_s, findings);
-                report_body(&found, turns_of_imu, findings);
+                report_body(&found, rotations_of_imu, findings);
                 let placed = PlacedForces { poses: &self.poses, clock: &found, samples: &imu_facts.samples };
                 if findings.can_compare(Measurement::Accelerometer) && !placed.report_axes(findings) {
                     self.report_world(&found, imu_facts, findings);
@@ -253,7 +253,7 @@ fn report_failure(error: &AlignmentError, findings: &mut Findings) {
     findings.add(Severity::Note, Area::Log, title, error.to_string(), "");
 }
 
-fn report_body(found: &ClockAlignment, turns_of_imu: &[UnitQuaternion<f64>], findings: &mut Findings) {
+fn report_body(found: &ClockAlignment, rotations_of_imu: &[UnitQuaternion<f64>], findings: &mut Findings) {
     let body_from_imu = so3::exp(&Vector3::from(found.camera_from_body_rad));
     let angle_rad = body_from_imu.angle();
     // Each rotation measures two axes; the misfit of one is averaged over all.
@@ -277,8 +277,8 @@ fn report_body(found: &ClockAlignment, turns_of_imu: &[UnitQuaternion<f64>], fin
             vector.x, vector.y, vector.z
         );
         let turned = format!("rotated by {:.1}°", angle_rad.to_degrees());
-        let is_same = |turn: &UnitQuaternion<f64>| turn.angle_to(&body_from_imu) < ORIENTATION_TOLERANCE_RAD;
-        if !turns_of_imu.is_empty() && turns_of_imu.iter().all(is_same) {
+        let is_same = |rotation: &UnitQuaternion<f64>| rotation.angle_to(&body_from_imu) < ORIENTATION_TOLERANCE_RAD;
+        if !rotations_of_imu.is_empty() && rotations_of_imu.iter().all(is_same) {
             let title = format!("the axes of the IMU are not those of the rig: {turned}");
             let evidence = format!("ground truth and cameras agree with each other: {evidence}");
             let remedy = "publish the IMU in the axes of the calibration, or calibrate the extrinsics of all cameras with \

@@ -83,7 +83,7 @@ pub(crate) struct Survey {
     pub(crate) solved: Vec<SolvedAttitude>,
     /// Variance of a reading of each joint: the rig's variance, or the variance of its white noise if it is larger.
     encoder_variances_rad2: Vec<f64>,
-    /// True for joints whose readings are angles in radians, which repeat after a turn.
+    /// True for joints whose readings are angles in radians, which repeat after a revolution.
     wraps: Vec<bool>,
     /// Names in the joint messages.
     pub(crate) joint_names: Vec<String>,
@@ -345,7 +345,7 @@ fn take_gimbal_imu(
     Ok(())
 }
 
-/// True for a reading that can be an angle in radians, with whole turns.
+/// True for a reading that can be an angle in radians, with whole revolutions.
 pub(crate) fn is_in_radians(reading: f64) -> bool {
     reading.abs() <= MAX_LIMIT_RAD
 }

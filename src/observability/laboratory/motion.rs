@@ -152,9 +152,9 @@ const PATH: [Sine; 3] = [sine(1.2, 1.6, 0.0), sine(0.9, 2.4, 0.7), sine(0.7, 2.0
 const VELOCITY_M_PER_S: Vector3<f64> = Vector3::new(0.9, 0.4, -0.3);
 /// Acceleration of the vehicle in motions with constant acceleration.
 const ACCELERATION_M_PER_S2: Vector3<f64> = Vector3::new(0.5, -0.35, 0.2);
-/// Angular rate of a steady turn about the vertical.
+/// Angular rate of a circle about the vertical.
 const TURN_RATE_RAD_PER_S: f64 = 0.6;
-/// Path of a steady turn: a circle that starts along x, with a constant climb.
+/// Path of a circle that starts along x, with a constant climb.
 const TURN: [Sine; 2] = [sine(1.5, TURN_RATE_RAD_PER_S, 0.0), sine(1.5, TURN_RATE_RAD_PER_S, -0.25 * TAU)];
 /// Angles of the joints; further joints repeat them.
 const JOINTS: [Sine; 5] =

@@ -87,7 +87,7 @@ impl Breakpoints {
         &self.list
     }
 
-    /// Appends an enabled breakpoint.
+    /// Appends an enabled breakpoint with this condition.
     pub fn add(&mut self, condition: Condition) {
         self.list.push(Breakpoint::new(condition));
     }

@@ -5,7 +5,7 @@ use crate::session::plan::ForkChanges;
 
 /// Ratio of the steps of a span after which trials are compared with the run itself.
 const COMPARED_AT: f64 = 0.6;
-/// Largest ratio of a trial's cost to that of the run itself.
+/// Largest ratio of a trial's cost to the cost of the run itself.
 const WORSE_RATIO: f64 = 1.1;
 /// Smallest ratio of the gain of the best trial that another one must reach.
 const LEAST_GAIN: f64 = 0.2;

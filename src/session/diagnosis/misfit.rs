@@ -56,8 +56,8 @@ pub(super) struct StepMisfit {
 }
 
 impl StepMisfit {
-    /// Residuals of a step whose pixels are `pixel_scale` times those of the image; `resolution_px` is that of the main
-    /// camera, `features` the number of its features tracked from the previous image.
+    /// Residuals of a step whose pixels are `pixel_scale` times the pixels of the image; `resolution_px` belongs to the
+    /// main camera, `features` is the number of its features tracked from the previous image.
     pub(super) fn of(report: &StepReport, features: usize, pixel_scale: f64, resolution_px: [usize; 2]) -> Self {
         let mut pixels = PixelHistogram::default();
         let mut outside = [PixelHistogram::default(); 4];
@@ -101,7 +101,7 @@ impl StepMisfit {
     }
 }
 
-/// Scale on which trials are compared: that of the best one.
+/// Scale on which trials are compared, from the best one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Scale {
     /// Standard deviation of a coordinate of an observation.
@@ -137,7 +137,7 @@ pub(super) struct Misfit {
     pub(super) factors: [FactorMisfit; 3],
     /// Mean χ² of the rig's prior on the calibration.
     pub(super) calibration: f64,
-    /// As in [`StepMisfit`].
+    /// Residuals outside each half of the image, in the order of [`ImageHalf::NAMES`].
     pub(super) outside: [PixelHistogram; 4],
     /// Sums of features and inliers over the steps with a window.
     pub(super) features: usize,
@@ -239,7 +239,7 @@ impl Misfit {
         let tracked = self.tracked_ratio();
         let blind = 1.0 - tracked;
         let visual = visual_cost(&self.pixels, scale);
-        // Rows of IMU and encoders grow with the number of frames, those of the prior do not.
+        // Rows of IMU and encoders grow with the number of frames, rows of the prior do not.
         let of_steps = 1.0 / self.tracked.max(1) as f64;
         let of_frames = scale.frames / self.frames.max(1) as f64;
         let part = |index: usize, share: f64| {
@@ -266,7 +266,7 @@ impl Misfit {
     }
 }
 
-/// Mean cost of an observation, that of a lost one without observations.
+/// Mean cost of an observation; the cost of a lost observation without any.
 fn visual_cost(pixels: &PixelHistogram, scale: &Scale) -> f64 {
     let lost = PixelHistogram::lost().mean_cost(scale.sigma_px).unwrap_or_default();
     pixels.mean_cost(scale.sigma_px).map_or(lost, |cost| cost.min(lost))

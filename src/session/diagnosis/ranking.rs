@@ -17,7 +17,7 @@ pub(super) struct RankedTrial {
     pub(super) hypothesis: TrialHypothesis,
     pub(super) result: TrialResult,
     pub(super) misfit: Misfit,
-    /// Lower is better.
+    /// Score of the trial; the lowest one is the best.
     pub(super) score: f64,
 }
 

@@ -20,7 +20,7 @@ const NOISE_FACTORS: [f64; 2] = [1.1, 1e3];
 /// Fewest steps on either side of a change of a joint's offset.
 const STEPS_BESIDE: usize = 15;
 
-/// Hypotheses with values from the trials.
+/// Hypotheses of the same kinds with values that the columns and residuals of the trials estimate.
 pub(super) fn refined(run: &DiagnosedRun<'_>, candidates: &[RankedTrial]) -> Vec<TrialHypothesis> {
     let mut all = Vec::new();
     for candidate in candidates {

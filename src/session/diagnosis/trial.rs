@@ -35,7 +35,7 @@ pub(super) struct TrialSpan {
     pub(super) steps: Range<usize>,
     /// Step by which a trial must have a window, `None` if none must.
     pub(super) window_by: Option<usize>,
-    /// True if the engine is that of the start of the run, without a window.
+    /// True if the engine starts with the run, without a window.
     pub(super) is_start: bool,
 }
 
@@ -127,7 +127,7 @@ impl DiagnosedRun<'_> {
     }
 }
 
-/// Scale of the pixels that the estimator uses, relative to those of the image.
+/// Ratio of the pixels that the estimator uses to the pixels of the image.
 fn pixel_scale(changes: &ForkChanges) -> f64 {
     let focal = changes.corrections.iter().filter(|it| matches!(it.kind, FaultKind::Focal | FaultKind::Zoom));
     focal.map(|fault| fault.value(0).recip()).product()

@@ -1,11 +1,11 @@
-//! Values and steps around those of the best trials.
+//! Values and steps around the values and steps of the best trials.
 
 use super::hypotheses::TrialHypothesis;
 use super::ranking::RankedTrial;
 use super::scoring::Trials;
 use crate::faults::{Explanation as _, Fault, FaultKind};
 
-/// Steps around that of the best change which are tried.
+/// Steps relative to the step of the best change that are tried.
 const MOVES: [isize; 8] = [-16, -8, -4, -2, -1, 1, 2, 4];
 /// Ratios of the first and the second value of a fault that are tried before a parabola has three points.
 const SPREADS: [[f64; 2]; 2] = [[0.94, 1.06], [0.6, 1.6]];
@@ -19,7 +19,7 @@ pub(super) fn moved(trials: &Trials) -> Vec<TrialHypothesis> {
     steps.into_iter().flatten().map(|step| TrialHypothesis { from: Some(step), ..hypothesis.clone() }).collect()
 }
 
-/// Values around those of the best offset of a joint and the best zoom.
+/// Hypotheses with values around the best offset of a joint and around the best zoom.
 pub(super) fn tuned(candidates: &[RankedTrial]) -> Vec<TrialHypothesis> {
     let mut all = Vec::new();
     for cause in [FaultKind::JointOffset, FaultKind::Zoom] {

@@ -46,7 +46,7 @@ impl MeasurementCorrections {
         Ok(Self { camera, joint_names, faults: faults.to_vec(), start_ns: None, unread })
     }
 
-    /// Adds the corrections of a fork to those of its parent.
+    /// Adds the corrections of a fork to the corrections of its parent.
     pub(super) fn add(&mut self, other: Self) {
         self.camera = other.camera.or_else(|| self.camera.take());
         self.joint_names = other.joint_names;

@@ -19,7 +19,7 @@ const COMPARED_ANGLES: usize = 24;
 /// Posterior of earlier flights, read from the folder of a run or of an offline calibration.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FlightPrior {
-    /// Folder that it was read from.
+    /// Folder of the run or the calibration.
     pub folder: PathBuf,
     /// Keys of the cameras of the posterior, in its order.
     pub cameras: Vec<String>,

@@ -130,8 +130,9 @@ pub struct ParameterInformation {
 /// Percentiles of one stage's time in milliseconds.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StageSummary {
+    /// Median over the estimated frames.
     pub p50: f64,
-    /// 95th percentile.
+    /// 95th percentile over the estimated frames.
     pub p95: f64,
     pub max: f64,
 }
@@ -146,7 +147,7 @@ impl Serialize for TimingSummary {
     }
 }
 
-/// Content of `summary.json`.
+/// Summary of a run, the content of `summary.json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RunSummary {
     /// File name of the log.

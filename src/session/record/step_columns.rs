@@ -116,7 +116,7 @@ impl RunRecord {
         })
     }
 
-    /// Joint angles.
+    /// Columns of the joint angles of the newest frame, one for each joint of the rig, in radians.
     pub fn joint_columns<'a>(&self, rig: &Rig) -> impl Iterator<Item = StepColumn<'a>> {
         let newest = self.steps.iter().filter_map(|step| step.report.newest());
         let count = newest.map(|newest| newest.joint_angles_rad.len()).max().unwrap_or(0);

@@ -38,8 +38,8 @@ pub struct TrajectoryAccuracy {
     pub ate_max_m: f64,
     /// `ate_rmse_m` in percent of `length_m`; zero for a path without length.
     pub ate_percent_of_length: f64,
-    /// Heading error gained per full turn in degrees, negative if the estimate lags behind the turn; `None` if the
-    /// vehicle turns by less than half a turn, or against positions of an antenna.
+    /// Heading error gained per revolution in degrees, negative if the estimate lags behind the rotation; `None` if the
+    /// heading changes by less than half a revolution, or against positions of an antenna.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub heading_drift_deg_per_turn: Option<f64>,
     /// Length of the ground-truth path over the estimated frames, in metres.

@@ -6,7 +6,7 @@ use crate::estimator::FactorKind;
 use crate::flight_log::{LogWarning, Magnitude, WarningKind};
 use crate::geometry::seconds_from_ns;
 
-/// Warnings of one kind.
+/// Warnings of one kind, which are shown as one line.
 #[derive(Debug)]
 pub struct WarningLine<'a> {
     /// Label of the run; `None` for the log.

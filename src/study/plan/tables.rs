@@ -34,7 +34,8 @@ fn exclusion(section: &Section<'_>) -> Result<Exclusion, PlanError> {
     Ok(exclusion)
 }
 
-/// Returns an error for exclusions of unknown levels. Names of recorded logs are unknown until their files are found.
+/// Checks that the exclusions name known levels; an error otherwise. Names of recorded logs are unknown until their files
+/// are found.
 pub(super) fn check_exclusions(root: &Section<'_>, plan: &StudyPlan) -> Result<(), PlanError> {
     let sections = root.sections("exclude")?;
     for (section, exclusion) in sections.iter().zip(&plan.exclusions) {

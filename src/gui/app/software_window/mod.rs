@@ -27,7 +27,7 @@ pub(super) struct SoftwareWindow {
 }
 
 impl SoftwareWindow {
-    /// `target_format` is the format of the window's pixels on the adapter.
+    /// Painter for a window whose pixels have the format `target_format` on the adapter.
     pub(super) fn new(target_format: wgpu::TextureFormat) -> Self {
         Self {
             tessellation: Tessellation::default(),

@@ -58,7 +58,7 @@ impl ShapeHasher {
         self.all = mixed(self.all, self.last);
     }
 
-    /// Hash of the last shape, equal in every process: of texts it contains only positions and colours.
+    /// Hash of the last shape, equal in every process; texts contribute their positions and colours only.
     pub(super) fn last(&self) -> u64 {
         self.last
     }

@@ -20,7 +20,7 @@ use crate::gui::{PanelContext, PanelName};
 /// Minimum width of the menu in points.
 const MIN_WIDTH: f32 = 190.0;
 
-/// Position of the pointer when the menu was opened, with the things under it.
+/// Position of the pointer when the menu was opened, with the objects under it.
 #[derive(Debug)]
 pub(super) struct MenuPlace {
     at: Pos2,

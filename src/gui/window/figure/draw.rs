@@ -36,7 +36,7 @@ pub struct FigureInput<'a> {
 }
 
 impl<'a> FigureInput<'a> {
-    /// Panels as they are first, with the chain of the shown run moved by `slide`.
+    /// Input with panels in their initial state and the chain of the shown run moved by `slide`.
     pub fn new(
         recording: &'a Recording,
         images: &'a mut dyn ImageSource,

@@ -1,7 +1,7 @@
 //! Planned motions: curves of joints and vehicle that leave the calibration with the smallest predicted σ.
 //!
 //! A motion is one spline per joint and per axis of the vehicle ([`MotionSplines`](crate::simulation::MotionSplines)).
-//! Its information is that of consecutive windows with the keyframes that the estimator makes of it, each linearized by
+//! Its information is summed over consecutive windows of the keyframes that the estimator would take, each linearized by
 //! the factors of the estimator. The search adds bumps to the splines within the limits of joints and vehicle.
 
 mod admitted;

@@ -21,7 +21,7 @@ pub struct PlannedParameter {
     pub prior_sigma: f64,
     /// Predicted σ after the motion.
     pub sigma: f64,
-    /// Ratio of the two.
+    /// `sigma` over `prior_sigma`.
     pub ratio: f64,
     /// Verdict on the parameter after the motion.
     pub verdict: Determination,

@@ -1,6 +1,6 @@
 //! Experiments with columns of sensors: times, shutter and intrinsics of the camera, intrinsics of the IMU.
 //!
-//! Unknowns, IMU factor and encoder factor are those of the estimator. Only the motion is continuous: an image row is
+//! Unknowns, IMU factor and encoder factor are the estimator's. Only the motion is continuous: an image row is
 //! exposed at its own time, the camera's pose at that time follows from the IMU, and the preintegration between frames
 //! is exact (docs/mathematics.md, section 11).
 

@@ -67,11 +67,11 @@ impl ContinuousImu<'_> {
 /// Change of rotation, position and velocity since a start time, in the IMU frame at that time and without gravity.
 #[derive(Clone, Debug)]
 pub(super) struct Change {
-    /// ΔR.
+    /// ΔR, `first_from_last` of the IMU frames at both times.
     pub(super) rotation: Matrix3<f64>,
-    /// Δp.
+    /// Δp in the first frame, in metres, without gravity and initial velocity.
     pub(super) position: Vector3<f64>,
-    /// Δv.
+    /// Δv in the first frame, in m/s, without gravity.
     pub(super) velocity: Vector3<f64>,
     /// Derivative of `[φ, p, v]` by biases and intrinsics, rotations perturbed on the right.
     pub(super) by_imu: SMatrix<f64, 9, IMU_COLUMNS>,

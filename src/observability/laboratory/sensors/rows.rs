@@ -16,7 +16,7 @@ use crate::sensors::{JointAngles, JointMotionFit};
 
 /// A pivot below this ratio of a landmark's columns marks an unobservable coordinate of the landmark.
 const DEPENDENT: f64 = 1e-11;
-/// Rows `[φ, p, v]` of the IMU factor, before those of the biases.
+/// Rows `[φ, p, v]` of the IMU factor, before the rows of the biases.
 const MOTION_ROWS: usize = 9;
 
 /// Rows of one landmark or of one other factor.

@@ -91,8 +91,8 @@ struct JointsAt {
 }
 
 impl<'a> SensorWindow<'a> {
-    /// Window of an experiment in one parameterization, with those of these sensor columns that its measurements can have:
-    /// encoders and IMU only where they measure, lens coefficients only where the camera has them.
+    /// Window of an experiment in one parameterization, with the sensor columns that its measurements have: encoders and
+    /// IMU only where they measure, lens coefficients only where the camera has them.
     pub(super) fn new(setup: &'a LaboratorySetup, form: LaboratoryForm, columns: SensorColumns) -> Self {
         let flight = setup.flight();
         let times_s: Vec<f64> = (0..setup.frames).map(LaboratorySetup::time_s).collect();
@@ -199,7 +199,7 @@ impl<'a> SensorWindow<'a> {
     }
 
     /// Predicted pixel of a position in a frame, at the row in which it was observed (Eqs. 9, 10); `None` behind the
-    /// camera. `changes` are those of [`Self::readout_changes`].
+    /// camera. `changes` come from [`Self::readout_changes`].
     pub(super) fn predict(
         &self,
         state: &SensorState,
