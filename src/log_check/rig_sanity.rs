@@ -23,8 +23,6 @@ const SQUARE_PIXELS: std::ops::RangeInclusive<f64> = 0.9..=1.1;
 const USUAL_FIELD_DEG: std::ops::RangeInclusive<f64> = 25.0..=200.0;
 /// Distance of the checked pixels from the border, as a ratio of the side.
 const BORDER: f64 = 0.05;
-/// Factor on the pixels of the corners that leaves this distance on both sides.
-const INNER: f64 = 0.9;
 /// Wide prior of the lengths of a chain.
 const WIDE_PRIOR_M: f64 = 0.1;
 /// Wide prior of the angles of a chain.
@@ -153,7 +151,8 @@ fn field_of_view_deg(model: &CameraModel) -> Option<f64> {
     let [width, height] = model.resolution_px.map(|side| side as f64);
     let direction = |u: f64, v: f64| model.unproject(&Vector2::new(u, v));
     for corner in [(0.0, 0.0), (width - 1.0, 0.0), (0.0, height - 1.0), (width - 1.0, height - 1.0)] {
-        let inside = (INNER * corner.0 + BORDER * width, INNER * corner.1 + BORDER * height);
+        let inner = 1.0 - 2.0 * BORDER;
+        let inside = (inner * corner.0 + BORDER * width, inner * corner.1 + BORDER * height);
         direction(inside.0, inside.1)?;
     }
     let [_, _, cx, cy] = model.intrinsics_px;

@@ -2,6 +2,9 @@ use nalgebra::Vector3;
 
 use crate::geometry::seconds_from_ns;
 
+/// Standard gravity (ISO 80000-3), the unit of accelerations in g.
+pub const STANDARD_GRAVITY_M_PER_S2: f64 = 9.806_65;
+
 /// IMU sample in the IMU frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImuSample {

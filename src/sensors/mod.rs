@@ -17,7 +17,7 @@ pub use attitude_source::{
     AngleUnit, AttitudeFrame, AttitudeMessage, AttitudeSource, AttitudeValue, EulerAngles, EulerRotation,
 };
 pub use image_mask::{GrayImage, ImageMask};
-pub use imu::{ImuNoise, ImuSample, rotation_steps};
+pub use imu::{ImuNoise, ImuSample, STANDARD_GRAVITY_M_PER_S2, rotation_steps};
 pub use imu_intrinsics::{ImuIntrinsics, ImuIntrinsicsParameters, KalibrImuMatrices, ScaleMisalignment};
 pub use joints::{JointAngles, JointMotionFit, JointSample};
 pub use named_axes::{BodyAxes, NamedAxes};

@@ -10,7 +10,7 @@ mod ground_truth;
 mod imu;
 mod joint_angles;
 mod joint_topic;
-mod ordered;
+pub(crate) mod ordered;
 mod read_context;
 mod sensor_samples;
 #[cfg(test)]

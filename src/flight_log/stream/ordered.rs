@@ -10,7 +10,7 @@ use super::read_context::{Drops, ReadContext, Refusal};
 use crate::geometry::seconds_from_ns;
 
 /// Messages out of order by up to this are sorted; later ones are dropped.
-const HORIZON_NS: i64 = 100_000_000;
+pub(crate) const HORIZON_NS: i64 = 100_000_000;
 /// Logs that start later than this, in nanoseconds since the Unix epoch, have stamps of a clock that is set (1973), in
 /// which 0 is no time.
 const EARLIEST_CLOCK_NS: i64 = 100_000_000_000_000_000;

@@ -16,7 +16,7 @@ use super::survey::Survey;
 use crate::faults::{Fault, FaultKind};
 use crate::files::rig::read::USUAL_GRAVITY_M_PER_S2;
 use crate::geometry::{mean, seconds_from_ns};
-use crate::sensors::{AngularRates, ImuSample, Rig};
+use crate::sensors::{AngularRates, ImuSample, Rig, STANDARD_GRAVITY_M_PER_S2};
 
 /// Norm of the specific force below which it counts as unset in the message.
 const NO_FORCE_M_PER_S2: f64 = 0.01;
@@ -30,8 +30,6 @@ const RANGE_TOLERANCE: f64 = 0.03;
 pub(super) const LARGEST_BIAS_M_PER_S2: f64 = 0.3;
 /// Gravities of a rig that are usual, in m/s²: on the ground it lies between 9.78 and 9.83.
 const USUAL_GRAVITIES: std::ops::RangeInclusive<f64> = 9.75..=9.85;
-/// Size of the unit g, in m/s².
-const STANDARD_GRAVITY: f64 = 9.806_65;
 /// Difference of a norm from 1 within which it is gravity in g.
 const UNIT_TOLERANCE: f64 = 0.2;
 /// Differences of the measured norm from gravity, in m/s², from which they are noted, a warning and an error.
@@ -187,7 +185,7 @@ fn check_gravity(
             Severity::Error,
             "accelerations are in g, not m/s²",
             "multiply by 9.80665 in the driver: sensor_msgs/Imu requires m/s²",
-            Some(Fault::new(FaultKind::AccelerometerScale, &[STANDARD_GRAVITY])),
+            Some(Fault::new(FaultKind::AccelerometerScale, &[STANDARD_GRAVITY_M_PER_S2])),
         )
     } else if measured < NO_GRAVITY_RATIO * gravity {
         (

@@ -13,6 +13,7 @@ use super::report::{Area, Findings, Severity};
 use super::statistics::percentile;
 use super::survey::Survey;
 use crate::flight_log::stamps::spacing::Spacing;
+use crate::flight_log::stream::ordered::HORIZON_NS;
 use crate::geometry::seconds_from_ns;
 use crate::sensors::Rig;
 
@@ -34,9 +35,6 @@ const SLOWEST_IMU_HZ: f64 = 100.0;
 const SLOWEST_CAMERA_HZ: f64 = 5.0;
 /// Ratio of the lowest rate below which a sensor is slow: clocks and losses change a rate by less.
 const SLOW_RATIO: f64 = 0.95;
-
-/// Lateness in seconds up to which a run sorts messages.
-const SORTED_S: f64 = 0.1;
 
 /// Checks rates, gaps, order and time bases of every topic that the rig names.
 pub(super) fn check_timing(survey: &Survey, rig: Option<&Rig>, findings: &mut Findings) {
@@ -112,7 +110,7 @@ fn check_order(used: &UsedTopic<'_>, findings: &mut Findings) {
         seconds_from_ns(stamps_ns[*first]),
         -deepest
     );
-    let (severity, title, remedy) = if deepest < -SORTED_S {
+    let (severity, title, remedy) = if deepest < -seconds_from_ns(HORIZON_NS) {
         let title = format!("stamps of {} run backwards", used.role);
         (Severity::Error, title, "check how the driver stamps; samples up to 0.1 s late are sorted, others are dropped")
     } else {

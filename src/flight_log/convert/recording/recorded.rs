@@ -8,9 +8,6 @@ use super::candidates::{Candidates, Samples};
 use crate::flight_log::trajectory::geodesy::Geodetic;
 use crate::geometry::seconds_from_ns;
 
-/// Standard gravity (ISO 80000-3), the unit of accelerations in g.
-pub(super) const STANDARD_GRAVITY_M_PER_S2: f64 = 9.80665;
-
 /// IMU of a recording: angular velocities in rad/s and specific forces in m/s², in the IMU frame.
 #[derive(Clone, Debug, Default)]
 pub(super) struct RecordedImu {

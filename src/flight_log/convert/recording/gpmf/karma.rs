@@ -1,9 +1,10 @@
 //! Telemetry that a `GoPro` Karma drone adds to the camera's telemetry, about four times a second.
 
 use super::super::mp4::Payload;
-use super::super::recorded::{Recorded, STANDARD_GRAVITY_M_PER_S2, finite, from_euler, nanoseconds};
+use super::super::recorded::{Recorded, finite, from_euler, nanoseconds};
 use super::items::{Item, Properties};
 use crate::flight_log::trajectory::geodesy::Geodetic;
+use crate::sensors::STANDARD_GRAVITY_M_PER_S2;
 
 /// Drone telemetry in drone time, with the samples that relate drone time to video time.
 #[derive(Debug)]

@@ -14,12 +14,11 @@ use super::super::ConvertError;
 use super::super::sink::LogSink;
 use super::attitude::gimbal_attitude;
 use super::candidates::Preference;
-use super::recorded::{
-    GimbalAttitude, GimbalFrame, Recorded, STANDARD_GRAVITY_M_PER_S2, finite, from_euler, nanoseconds, rotation,
-};
+use super::recorded::{GimbalAttitude, GimbalFrame, Recorded, finite, from_euler, nanoseconds, rotation};
 use super::scalar::Scalar;
 use crate::flight_log::container::file::LogFile;
 use crate::flight_log::trajectory::geodesy::Geodetic;
+use crate::sensors::STANDARD_GRAVITY_M_PER_S2;
 pub(super) use frames::is_telemetry;
 use frames::{Frame, Frames};
 use vehicles::Vehicle;
