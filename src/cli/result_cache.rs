@@ -81,7 +81,8 @@ fn key(options: &str, log: &Path, estimation: &EstimationArguments, plan: &Sessi
 }
 
 impl CachedResult {
-    /// Cached files of the same command on the same inputs. A damaged entry is reported on the terminal.
+    /// Cached files of an earlier call with equal command and inputs; `None` without one. A damaged entry is reported on the
+    /// terminal.
     pub(crate) fn load(&self) -> Option<Vec<CachedFile>> {
         self.cache.load(&self.key).unwrap_or_else(|problem| {
             notify(&format!("dcvins: {problem}"));

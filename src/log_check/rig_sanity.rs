@@ -13,7 +13,7 @@ const INTRINSICS_TOLERANCE: f64 = 0.02;
 const CELLS: u32 = 8;
 /// Distance of the principal point from the image centre, as a ratio of half the side, that is reported.
 const FAR_CENTRE: f64 = 0.25;
-/// The same distance for an error.
+/// Distance of the principal point from the image centre, as a ratio of half the side, that is an error.
 const WRONG_CENTRE: f64 = 0.4;
 /// Relative difference of the distances along both sides up to which the intrinsics belong to an image of another size.
 const SAME_SCALE: f64 = 0.1;

@@ -251,7 +251,7 @@ impl<P: PoseEquations> NullaryFnOnce for Elimination<'_, P> {
 struct CommonBlock<const N: usize> {
     gradient: Vector6<f64>,
     coupling: Matrix6x3<f64>,
-    /// Hessian with the anchor's blocks from this one on.
+    /// Sums for the blocks of the Hessian between this block and the anchor's blocks, from this block on.
     with_anchor: [Matrix6<f64>; N],
     with_shared: Matrix6<f64>,
 }

@@ -47,7 +47,7 @@ impl Named for WorldKind {
 }
 
 impl WorldKind {
-    /// Environment that has this variant, `None` for both.
+    /// Environment that has this variant; `None` for a variant of both environments.
     pub(crate) fn environment(self) -> Option<Environment> {
         match self {
             Self::Textured => None,

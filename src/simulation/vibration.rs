@@ -19,9 +19,9 @@ const HARMONICS: [(f64, f64); 4] = [(1.0, 1.0), (2.0, 0.5), (3.0, 0.25), (4.0, 0
 const IDLE_RATIO: f64 = 0.6;
 /// Time constant with which rotors follow the commanded thrust.
 const ROTOR_S: f64 = 0.1;
-/// Amplitude of random changes of a rotor's speed.
+/// Amplitude of random changes of a rotor's speed, as a ratio of the speed.
 const WANDER_RATIO: f64 = 0.03;
-/// Longest period of these changes.
+/// Longest period of the random changes of a rotor's speed, in seconds.
 const WANDER_S: f64 = 7.1;
 /// Velocity from which the vehicle counts as airborne.
 const AIRBORNE_M_PER_S: f64 = 0.2;

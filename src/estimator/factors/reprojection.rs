@@ -198,7 +198,7 @@ impl<'a> Anchor<'a> {
 pub(crate) enum RobustWeight {
     /// Weight of the track as a whole, to be multiplied by the weight of the observation's residual.
     OfTrack(f64),
-    /// Product of both, from a report.
+    /// Weight of the observation, from a report: the weight of its track times the weight of its residual.
     Known(f64),
 }
 

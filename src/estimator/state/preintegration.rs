@@ -360,7 +360,8 @@ impl Preintegration {
         j.fixed_view_mut::<3, 3>(0, 0).copy_from(&(step.e_transpose * phi_by_bg - step.phi_by_w));
     }
 
-    /// The intrinsics change both ends by nearly the same: the mean over the whole interval is used.
+    /// Propagates the Jacobian by the intrinsics over one interval; their effect on both ends is nearly equal, so that its
+    /// mean over the interval is used.
     fn propagate_intrinsics_jacobian(&mut self, step: &SampleStep, ends: [&ImuSample; 2]) {
         let Some(intrinsics) = &mut self.intrinsics else { return };
         let [first, second] = ends.map(|sample| imu_errors::derivatives(&intrinsics.errors, sample));

@@ -11,7 +11,7 @@ use crate::sensors::ImuSample;
 /// Angular rate of a vehicle that certainly rotates, in rad/s: above bias and noise of a gyroscope. An exact zero between
 /// two such samples is none: gyroscopes have steps of 0.001 rad/s, and their rate does not jump by this within a sample.
 pub(crate) const ROTATING_RAD_PER_S: f64 = 0.05;
-/// Time after such a rate for which the vehicle is taken to move.
+/// Time after a rate above [`ROTATING_RAD_PER_S`] for which the vehicle is taken to move.
 pub(crate) const ROTATING_NS: i64 = 1_000_000_000;
 /// Longest interval of zeros that is judged by the samples around it; longer ones are taken for a stationary vehicle
 /// whose driver rounds small rates to zero.

@@ -44,7 +44,7 @@ const MIN_OVER_TIME_HEIGHT: f32 = 74.0;
 /// Height of the legend above the bars of the histogram, in points.
 const LEGEND_HEIGHT: f32 = 18.0;
 
-/// View of a panel that is too small for both.
+/// View that a panel shows if it is too small for both views.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum ResidualView {
     /// Histogram, RMS over time, χ² by factor.

@@ -11,9 +11,9 @@ use crate::sensors::{Joint, Rig};
 
 /// Smallest number of equal readings in an interval that counts as frozen.
 const FROZEN_READINGS: usize = 20;
-/// Shortest such interval in nanoseconds.
+/// Shortest interval of equal readings that counts as frozen, in nanoseconds.
 const FROZEN_NS: i64 = 200_000_000;
-/// Smallest ratio of readings that differ from the one before outside of such intervals: an encoder with coarse steps
+/// Smallest ratio of readings that differ from the one before outside of frozen intervals: an encoder with coarse steps
 /// repeats its readings while it works.
 const MIN_CHANGING: f64 = 0.95;
 /// A reading this close to a limit, in radians, counts as at the limit: at its stop a joint may repeat a reading.

@@ -33,7 +33,7 @@ const AT_LIMIT_RATIO: f64 = 0.01;
 const FREE_ROTATION_RAD: f64 = 0.1;
 /// Ratio of the measured noise of an encoder to the rig's from which the rig's is too small.
 const NOISE_TOO_SMALL: f64 = 2.0;
-/// Ratio of the same below which the rig's noise is too large.
+/// Ratio of the measured noise of an encoder to the rig's below which the rig's is too large.
 const NOISE_TOO_LARGE: f64 = 0.2;
 /// One unreachable attitude in this many is reported.
 const UNREACHABLE_ONE_IN: usize = 100;

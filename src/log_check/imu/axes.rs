@@ -11,7 +11,7 @@ use crate::sensors::ImuSample;
 
 /// Length over which specific forces are averaged, in nanoseconds.
 pub(crate) const WINDOW_NS: i64 = 250_000_000;
-/// Minimum number of such windows.
+/// Minimum number of averaged specific forces.
 const MIN_WINDOWS: usize = 12;
 /// Length of the pieces in which the vertical is constant, in seconds: errors of the gyroscope's bias add up.
 const PIECE_S: f64 = 10.0;
@@ -24,7 +24,7 @@ const DECISIVE: f64 = 20.0;
 /// Largest variance of the vertical, as a ratio of the square of the force, with which axes are believed.
 const LARGEST_SCATTER: f64 = 0.05;
 
-/// Largest ratio of that variance to the one in the IMU frame, without any rotation.
+/// Largest ratio of the variance of the vertical to the variance of the specific force in the IMU frame.
 const LARGEST_RATIO: f64 = 0.5;
 
 /// Remedy for axes that differ.

@@ -24,7 +24,7 @@ const NO_FORCE_M_PER_S2: f64 = 0.01;
 const NO_GRAVITY_RATIO: f64 = 0.3;
 /// Factors by which a wrong range setting changes measurements.
 const RANGE_FACTORS: [f64; 4] = [0.25, 0.5, 2.0, 4.0];
-/// Relative error of such a factor within which it counts as found.
+/// Relative error of the norm within which one of [`RANGE_FACTORS`] counts as found.
 const RANGE_TOLERANCE: f64 = 0.03;
 /// Bias of an accelerometer that is tolerated.
 pub(super) const LARGEST_BIAS_M_PER_S2: f64 = 0.3;

@@ -67,7 +67,7 @@ impl AllanPhase {
     }
 }
 
-/// Numbers of samples of the averaging times for stretches of these lengths, ascending.
+/// Numbers of samples of the averaging times, ascending; `longest` is the number of samples of the longest stretch.
 pub(super) fn counts(longest: usize) -> Vec<usize> {
     let last = longest / LONGEST_RATIO;
     let steps = (PER_OCTAVE * (last.max(1) as f64).log2()).floor() as usize;

@@ -20,7 +20,7 @@ const MIN_REPEATED: f64 = 0.1;
 const SEARCHED_S: f64 = 2.0;
 /// Ratio of copies, in tenths, that follow each other by two images if every second one is a copy.
 const EVERY_SECOND_TENTHS: usize = 8;
-/// Minimum number of copies for the same.
+/// Minimum number of copies of which every second image can be one.
 const MIN_COPIES: usize = 3;
 
 /// Reports stamps that occur several times, and two streams with the same measurements.

@@ -15,7 +15,7 @@ const MIN_SHARE: f64 = 0.05;
 const MIN_SEQUENCE: f64 = 0.3;
 /// Smallest ratio of the rate to the rate in the rig at which two publishers can share a topic.
 const DOUBLE_RATE: f64 = 1.7;
-/// Largest ratio of the rate to the rate in the rig for the same.
+/// Largest ratio of the rate to the rate in the rig at which two publishers can share a topic.
 const TRIPLE_RATE: f64 = 2.6;
 /// Smallest ratio of the shorter of two alternating steps to the mean step.
 const MIN_STEP: f64 = 0.15;

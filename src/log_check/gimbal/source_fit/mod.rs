@@ -43,7 +43,7 @@ const OFFSET_TOLERANCE_RAD: f64 = 0.026;
 const MIN_GAIN: f64 = 0.2;
 /// Steps of the coarse and the fine search for an offset of the first joint, in degrees.
 const OFFSET_STEPS_DEG: [f64; 2] = [10.0, 1.0];
-/// Number of those steps to either side: half a revolution, and one coarse step.
+/// Number of coarse and of fine steps to either side: half a revolution, and one coarse step.
 const OFFSET_STEPS: [i32; 2] = [18, 10];
 
 /// Interpretation that fits the images, in place of the rig's.
