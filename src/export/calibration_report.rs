@@ -11,6 +11,7 @@ use crate::geometry::{Dimension, RigidTransform, seconds_from_ns, so3};
 use crate::gimbal::{Chain, Quantity};
 use crate::sensors::Rig;
 use crate::session::{CalibrationErrors, CalibrationRun, FlightSigmas, WarningLine, log_warning_lines};
+use crate::table::text::{TextTable, left, right};
 use crate::text::{Named as _, log_name};
 
 /// One parameter before and after the calibration.
@@ -242,22 +243,19 @@ impl fmt::Display for CalibrationReport {
         if let Some(rank) = &self.rank {
             writeln!(f, "  Observability: {}", rank.verdict)?;
         }
-        writeln!(f, "\nParameters                        initial       final     ± σ")?;
-        for parameter in &self.parameters {
+        let columns = [left("Parameters", 28), right("initial", 13), right("final", 12), left("     ± σ", 0)];
+        let rows = self.parameters.iter().map(|parameter| {
             let (factor, unit) = parameter.dimension.shown_unit();
-            write!(
-                f,
-                "  {:<26} {:>12.4} {:>11.4} ± {:<9.4} {unit}",
-                parameter.name,
-                parameter.initial * factor,
-                parameter.last * factor,
-                parameter.sigma * factor
-            )?;
-            match parameter.error {
-                Some(error) => writeln!(f, "  (error {:+.4})", error * factor)?,
-                None => writeln!(f)?,
-            }
-        }
+            let [initial, last, sigma] = [parameter.initial, parameter.last, parameter.sigma].map(|it| it * factor);
+            let error = parameter.error.map_or_else(String::new, |error| format!("  (error {:+.4})", error * factor));
+            [
+                format!("  {}", parameter.name),
+                format!("{initial:.4}"),
+                format!("{last:.4}"),
+                format!(" ± {sigma:<9.4} {unit}{error}"),
+            ]
+        });
+        write!(f, "\n{}", TextTable::new(columns, rows).not_indented())?;
         matrix(f, "T_cam_imu of the static camera", &self.static_t_cam_imu)?;
         matrix(f, "T_imu_cam of the gimbal camera, all joints at zero", &self.gimbal_t_imu_cam_at_zero)?;
         if let Some(ground_truth) = &self.ground_truth {

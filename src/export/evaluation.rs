@@ -11,6 +11,7 @@ use crate::session::accuracy::{
     ErrorStatistics, RelativeDelta, TrajectoryAlignment, absolute_errors_m, align, associate, path_length_m,
     relative_errors,
 };
+use crate::table::text::{TextTable, left, right};
 
 /// Options of a comparison of two trajectories; the defaults are the settings of `evo_ape tum --align` and `evo_rpe tum
 /// --align`.
@@ -117,20 +118,17 @@ impl fmt::Display for EvaluationReport {
                 String::new()
             }
         )?;
-        writeln!(
-            formatter,
-            "{:<24}{:>12}{:>12}{:>12}{:>12}{:>12}{:>12}",
-            "", "rmse", "mean", "median", "std", "min", "max"
-        )?;
+        let columns = ["rmse", "mean", "median", "std", "min", "max"].map(|heading| right(heading, 12));
         let rows = [
             ("ATE (m)", &self.ate_m),
             ("RPE translation (m)", &self.rpe_translation_m),
             ("RPE rotation (°)", &self.rpe_rotation_deg),
         ];
-        for (name, row) in rows {
+        let rows = rows.map(|(name, row)| {
             let ErrorStatistics { count: _, rmse, mean, median, std, min, max } = row;
-            writeln!(formatter, "{name:<24}{rmse:>12.6}{mean:>12.6}{median:>12.6}{std:>12.6}{min:>12.6}{max:>12.6}")?;
-        }
-        Ok(())
+            let numbers = [rmse, mean, median, std, min, max].map(|value| format!("{value:.6}"));
+            [name.to_owned()].into_iter().chain(numbers)
+        });
+        write!(formatter, "{}", TextTable::new([left("", 24)].into_iter().chain(columns), rows).not_indented())
     }
 }

@@ -14,6 +14,7 @@ use crate::geometry::{ns_from_seconds, seconds_from_ns};
 use crate::observability::{UsefulStretch, UsefulStretches};
 use crate::sensors::Rig;
 use crate::session::{CollectedInformation, FlightSigmas};
+use crate::table::text::{TextTable, left, right};
 use crate::text::log_name;
 
 const INDEX: &str = "excerpt.json";
@@ -174,11 +175,12 @@ impl Display for ExcerptSummary {
             writeln!(f, "  {start_s:7.2} to {end_s:7.2} s  {log}; without it {needed}")?;
         }
         writeln!(f, "  σ of the stretches / σ of the whole flight")?;
-        writeln!(f, "  {:<26} {:>9} {:>9}", "parameter", "predicted", "achieved")?;
-        for parameter in &self.parameters {
+        let columns = [left("parameter", 26), right("predicted", 10), right("achieved", 10)];
+        let rows = self.parameters.iter().map(|parameter| {
             let achieved = parameter.achieved_ratio.map_or_else(|| "-".to_owned(), |ratio| format!("{ratio:.3}"));
-            writeln!(f, "  {:<26} {:>9.3} {achieved:>9}", parameter.name, parameter.predicted_ratio)?;
-        }
+            [parameter.name.clone(), format!("{:.3}", parameter.predicted_ratio), achieved]
+        });
+        write!(f, "{}", TextTable::new(columns, rows))?;
         let Some((worst, ratio)) = self.worst() else { return Ok(()) };
         let percent = 100.0 * (ratio - 1.0);
         if ratio <= AIM_RATIO {

@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use crate::calibration::{FittedDensity, FlightNoise, NoiseDensity};
 use crate::geometry::seconds_from_ns;
+use crate::table::text::{TextTable, left, right};
 use crate::text::{Named as _, printable};
 
 /// One density of [`FlightNoiseReport`].
@@ -105,13 +106,16 @@ impl Display for FlightNoiseReport {
             self.runs,
             if self.converged { "" } else { "; not converged" }
         )?;
-        writeln!(
-            out,
-            "  {:<40}{:>10}{:>22}{:>8}{:>14}{:>12}{:>8}",
-            "", "rig", "found ± σ", "ratio", "NIS/dof, rig", "NIS/dof", "dof"
-        )?;
-        for found in &self.densities {
-            let label = format!("{}, {}", found.key, found.unit);
+        let columns = [
+            left("", 40),
+            right("rig", 10),
+            right("found ± σ", 22),
+            right("ratio", 8),
+            right("NIS/dof, rig", 14),
+            right("NIS/dof", 12),
+            right("dof", 8),
+        ];
+        let rows = self.densities.iter().map(|found| {
             let value = found.sigma.map_or_else(
                 || "unobservable".to_owned(),
                 |sigma| {
@@ -120,13 +124,16 @@ impl Display for FlightNoiseReport {
                     format!("({:.2} ± {:.2})e{power:.0}", found.found / scale, sigma / scale)
                 },
             );
-            let ratio = found.sigma.map_or_else(String::new, |_| format!("{:.2}", found.found / found.rig));
-            writeln!(
-                out,
-                "  {label:<40}{:>10.2e}{value:>22}{ratio:>8}{:>14.2}{:>12.2}{:>8.0}",
-                found.rig, found.nis_before, found.nis_after, found.degrees_of_freedom
-            )?;
-        }
-        Ok(())
+            [
+                format!("{}, {}", found.key, found.unit),
+                format!("{:.2e}", found.rig),
+                value,
+                found.sigma.map_or_else(String::new, |_| format!("{:.2}", found.found / found.rig)),
+                format!("{:.2}", found.nis_before),
+                format!("{:.2}", found.nis_after),
+                format!("{:.0}", found.degrees_of_freedom),
+            ]
+        });
+        write!(out, "{}", TextTable::new(columns, rows))
     }
 }

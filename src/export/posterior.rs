@@ -13,6 +13,7 @@ use crate::geometry::Dimension;
 use crate::gimbal::{Chain, ParameterGroup, ParameterId, Parameterization, UnknownParameterization};
 use crate::sensors::Rig;
 use crate::session::{CalibrationRun, FlightPrior, FlightSigmas, Recording, RunRecord};
+use crate::table::text::{TextTable, left, right};
 use crate::text::{log_name, printable};
 
 /// File of the posterior in the folder of a run or of an offline calibration.
@@ -194,23 +195,16 @@ impl Display for SigmaTable {
         for (number, flight) in self.flights.iter().enumerate() {
             writeln!(f, "    {number}: {}", printable(&flight.source))?;
         }
-        write!(f, "  {:<26}", "parameter")?;
-        for number in 0..self.flights.len() {
-            write!(f, " {number:>9}")?;
-        }
-        writeln!(f)?;
-        for (name, dimension) in &self.parameters {
+        let numbers = (0..self.flights.len()).map(|number| right(number.to_string(), 10));
+        let columns = [left("parameter", 26)].into_iter().chain(numbers).chain([left("", 0)]);
+        let rows = self.parameters.iter().map(|(name, dimension)| {
             let (factor, unit) = dimension.shown_unit();
-            write!(f, "  {name:<26}")?;
-            for flight in &self.flights {
-                match flight.sigmas.get(name) {
-                    Some(sigma) => write!(f, " {:>9.4}", sigma * factor)?,
-                    None => write!(f, " {:>9}", "-")?,
-                }
-            }
-            writeln!(f, " {unit}")?;
-        }
-        Ok(())
+            let sigmas = self.flights.iter().map(|flight| flight.sigmas.get(name));
+            let sigmas =
+                sigmas.map(|sigma| sigma.map_or_else(|| "-".to_owned(), |sigma| format!("{:.4}", sigma * factor)));
+            [name.clone()].into_iter().chain(sigmas).chain([format!(" {unit}")]).collect::<Vec<_>>()
+        });
+        write!(f, "{}", TextTable::new(columns, rows))
     }
 }
 

@@ -9,6 +9,7 @@ use crate::calibration::stills::{
     StillsParameter,
 };
 use crate::geometry::Dimension;
+use crate::table::text::{TextTable, left, right};
 use crate::text::counted;
 
 /// Correlation from which a pair of parameters is printed.
@@ -131,31 +132,29 @@ impl StillsReport {
 
     fn errors(&self, f: &mut Formatter<'_>) -> fmt::Result {
         writeln!(f, "\nerrors in px, mean ± standard deviation over the sets")?;
-        writeln!(
-            f,
-            "  {:<12} {:<10} {:>18} {:>18} {:>20}",
-            "camera", "chain", "angles as read", "estimated¹", "as read, all sets"
-        )?;
+        let columns = [
+            left("camera", 13),
+            left("chain", 10),
+            right("angles as read", 19),
+            right("estimated¹", 19),
+            right("as read, all sets", 21),
+        ];
         let cell = |score: Option<PixelStatistics>| {
             score.map_or_else(|| "–".to_owned(), |it| format!("{:.4} ± {:.4}", it.mean_px, it.std_px))
         };
+        let mut rows = Vec::new();
         for floor in &self.outcome.floors {
-            writeln!(f, "  {:<12} {:<10} {:>18}", floor.camera, "floor", cell(Some(floor.floor)))?;
+            rows.push(vec![floor.camera.clone(), "floor".to_owned(), cell(Some(floor.floor))]);
             if floor.points_left_out > 0 {
-                writeln!(f, "  {:<12} {} left out", "", counted(floor.points_left_out, "point"))?;
+                rows.push(vec![String::new(), format!("{} left out", counted(floor.points_left_out, "point"))]);
             }
-            for score in self.outcome.scores.iter().filter(|score| score.camera == floor.camera) {
-                writeln!(
-                    f,
-                    "  {:<12} {:<10} {:>18} {:>18} {:>20}",
-                    "",
-                    score.chain.name(),
-                    cell(score.as_read),
-                    cell(score.estimated),
-                    cell(score.as_read_all)
-                )?;
-            }
+            let scores = self.outcome.scores.iter().filter(|score| score.camera == floor.camera);
+            rows.extend(scores.map(|score| {
+                let [as_read, estimated, all] = [score.as_read, score.estimated, score.as_read_all].map(cell);
+                vec![String::new(), score.chain.name().to_owned(), as_read, estimated, all]
+            }));
         }
+        write!(f, "{}", TextTable::new(columns, rows))?;
         writeln!(f, "  ¹ from half of the points of the rigid cameras, evaluated on the other half")
     }
 
@@ -166,18 +165,14 @@ impl StillsReport {
             "\nparameters ({}; σ is the larger of formal and jackknife over stations; others: parameters.csv)",
             table.parameterization
         )?;
-        writeln!(f, "  {:<26} {:>12} {:>12} {:>10}  unit", "", "initial", "value", "± σ")?;
-        for parameter in table.parameters.iter().chain(&self.outcome.rigid) {
+        let columns = [left("", 26), right("initial", 13), right("value", 13), right("± σ", 11), left("  unit", 0)];
+        let rows = table.parameters.iter().chain(&self.outcome.rigid).map(|parameter| {
             let (factor, unit, digits) = shown_unit(parameter);
-            writeln!(
-                f,
-                "  {:<26} {:>12.digits$} {:>12.digits$} {:>10.digits$}  {unit}",
-                parameter.name,
-                parameter.initial * factor,
-                parameter.value * factor,
-                parameter.sigma * factor
-            )?;
-        }
+            let [initial, value, sigma] = [parameter.initial, parameter.value, parameter.sigma]
+                .map(|value| format!("{:.digits$}", value * factor));
+            [parameter.name.clone(), initial, value, sigma, format!("  {unit}")]
+        });
+        write!(f, "{}", TextTable::new(columns, rows))?;
         let noise = &self.outcome.noise;
         writeln!(
             f,
@@ -190,10 +185,9 @@ impl StillsReport {
 
     fn ranks(&self, f: &mut Formatter<'_>) -> fmt::Result {
         writeln!(f, "\nrank of the chain: structural, of them informed (σ below 10° and 3 cm), of the columns")?;
-        writeln!(f, "  {:<20} {:>18} {:>18} {:>18}", "", "angles known", "encoder", "angles free")?;
         let mut names: Vec<&str> = self.outcome.ranks.iter().map(|rank| rank.parameterization).collect();
         names.dedup();
-        for name in names {
+        let rows = names.into_iter().map(|name| {
             let cell = |angles: AngleKnowledge| {
                 let found =
                     self.outcome.ranks.iter().find(|rank| rank.parameterization == name && rank.angles == angles);
@@ -203,8 +197,10 @@ impl StillsReport {
                 )
             };
             let cells = [AngleKnowledge::Known, AngleKnowledge::Encoder, AngleKnowledge::Free].map(cell);
-            writeln!(f, "  {:<20} {:>18} {:>18} {:>18}", name, cells[0], cells[1], cells[2])?;
-        }
+            [name.to_owned()].into_iter().chain(cells)
+        });
+        let columns = [left("", 20), right("angles known", 19), right("encoder", 19), right("angles free", 19)];
+        write!(f, "{}", TextTable::new(columns, rows))?;
         let reported = self.outcome.ranks.iter().filter(|rank| rank.parameterization == self.outcome.parameterization);
         for rank in reported.filter(|rank| !rank.null_directions.is_empty()) {
             writeln!(f, "  null with {} angles: {}", rank.angles.name(), rank.null_directions.join("; "))?;

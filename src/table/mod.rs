@@ -7,14 +7,13 @@ mod cell;
 mod column;
 #[cfg(feature = "logs")]
 mod csv;
-#[cfg(test)]
-mod documented;
 mod number;
+pub mod text;
 
 pub use self::cell::{Cell, CellValue, ColumnType, Stamp};
+#[cfg(test)]
+pub(crate) use self::column::documented;
 pub use self::column::{Column, Direction, Style, Tone, distinct};
 #[cfg(feature = "logs")]
 pub use self::csv::{csv, csv_text};
-#[cfg(test)]
-pub(crate) use self::documented::documented;
 pub use self::number::{Medium, Shown, fixed, significant};

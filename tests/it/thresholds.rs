@@ -8,8 +8,7 @@ use super::imports::{is_test_file, source_files};
 const DECIDE: [&str; 3] = ["faults/", "session/diagnosis/", "log_check/"];
 
 /// Constants whose digits decide nothing: a table with rows of its own, columns of fits and of a text, neutral values.
-const NOT_NUMBERS: [&str; 9] =
-    ["TABLE", "BIAS", "OFFSET", "SCALE", "CHAIN", "UNKNOWNS", "FIRST_NUMBER", "NONE", "UNEXPLAINED"];
+const NOT_NUMBERS: [&str; 8] = ["TABLE", "BIAS", "OFFSET", "SCALE", "CHAIN", "UNKNOWNS", "NONE", "UNEXPLAINED"];
 
 /// Values of the constants of a file and of its functions by name, as written, each in one line; texts and constants
 /// without a digit are omitted.

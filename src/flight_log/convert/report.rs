@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use serde::{Serialize, Serializer};
 
 use super::{ForceAgreement, VideoClock};
+use crate::table::text::{TextTable, left, right};
 use crate::text::{printable, shortened};
 
 /// Result of one topic of a source.
@@ -62,7 +63,7 @@ const WIDEST_NAME: usize = 60;
 impl Display for ConversionReport {
     fn fmt(&self, out: &mut Formatter<'_>) -> Result {
         writeln!(out, "{}: {}, {:.3} s", self.source.display(), self.kind, self.duration_s)?;
-        let header = ["topic", "type", "taken", "left", ""].map(str::to_owned);
+        let columns = [left("topic", 0), left("type", 0), right("taken", 0), right("left", 0), left("", 0)];
         let rows = self.topics.iter().map(|topic| {
             [
                 shortened(&topic.topic, WIDEST_NAME).into_owned(),
@@ -72,16 +73,7 @@ impl Display for ConversionReport {
                 topic.reason.as_deref().map(printable).unwrap_or_default().into_owned(),
             ]
         });
-        let rows: Vec<[String; 5]> = std::iter::once(header).chain(rows).collect();
-        let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
-        let widths = [width(0), width(1), width(2), width(3)];
-        for [topic, message_type, taken, left, reason] in &rows {
-            let line = format!(
-                "  {topic:0$}  {message_type:1$}  {taken:>2$}  {left:>3$}  {reason}",
-                widths[0], widths[1], widths[2], widths[3]
-            );
-            writeln!(out, "{}", line.trim_end())?;
-        }
+        write!(out, "{}", TextTable::new(columns, rows))?;
         for note in &self.notes {
             writeln!(out, "  note: {}", printable(note))?;
         }

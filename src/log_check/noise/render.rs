@@ -1,8 +1,9 @@
 //! Noise of an IMU as text, and as lines of a rig.
 
-use std::fmt::{Display, Formatter, Result, Write as _};
+use std::fmt::{Display, Formatter, Result};
 
 use super::{AllanReport, NoiseTerm, NoiseTerms, SensorNoise};
+use crate::table::text::{TextTable, left, right};
 use crate::text::printable;
 
 /// Maximum number of listed stretches.
@@ -47,7 +48,8 @@ fn write_sensor(out: &mut Formatter<'_>, sensor: &SensorNoise) -> Result {
         "\n{} (overlapping Allan deviation, {:.0} Hz, {:.0} s)",
         sensor.sensor, sensor.rate_hz, sensor.covered_s
     )?;
-    writeln!(out, "  {:<37}{:>10}{:>10}{:>10}{:>20}{:>10}", "", "x", "y", "z", "all ± σ", "rig")?;
+    let columns =
+        [left("", 37), right("x", 10), right("y", 10), right("z", 10), right("all ± σ", 20), right("rig", 10)];
     let given = |name: &str| {
         let given = sensor.given?;
         match name {
@@ -56,20 +58,15 @@ fn write_sensor(out: &mut Formatter<'_>, sensor: &SensorNoise) -> Result {
             _ => None,
         }
     };
-    for (name, unit, term) in TERMS {
-        let label = format!("{name}, {}", unit(sensor));
-        let mut line = format!("  {label:<37}");
-        for axis in &sensor.axes {
-            write!(line, "{:>10}", short(term(&axis.terms)))?;
-        }
+    let rows = TERMS.map(|(name, unit, term)| {
+        let mut row = vec![format!("{name}, {}", unit(sensor))];
+        row.extend(sensor.axes.iter().map(|axis| short(term(&axis.terms))));
         let all = term(&sensor.terms);
-        let text = all.value.zip(all.sigma).map_or_else(|| short(all), |(value, sigma)| with_sigma(value, sigma));
-        write!(line, "{text:>20}")?;
-        if let Some(given) = given(name) {
-            write!(line, "{given:>10.2e}")?;
-        }
-        writeln!(out, "{}", line.trim_end())?;
-    }
+        row.push(all.value.zip(all.sigma).map_or_else(|| short(all), |(value, sigma)| with_sigma(value, sigma)));
+        row.extend(given(name).map(|given| format!("{given:.2e}")));
+        row
+    });
+    write!(out, "{}", TextTable::new(columns, rows))?;
     for (name, _, term) in TERMS {
         let all = term(&sensor.terms);
         if !all.reason.is_empty() {

@@ -1,6 +1,7 @@
-use std::fmt::{Display, Formatter, Result, Write as _};
+use std::fmt::{Display, Formatter, Result};
 
 use super::{Area, CheckReport, Severity};
+use crate::table::text::{TextTable, left, right};
 use crate::text::{printable, shortened, without_signed_zeros};
 
 impl Severity {
@@ -37,10 +38,10 @@ impl Display for CheckReport {
         writeln!(out, "{}: {:.3} s, {rig}", self.log, self.duration_s)?;
         write!(out, "{}", self.verdict())?;
         writeln!(out)?;
-        let header = ["topic", "type", "role", "messages", "Hz", "first, s", "last, s", "delay, ms"].map(str::to_owned);
-        let mut rows = vec![header];
-        for topic in &self.topics {
-            rows.push([
+        let texts = ["topic", "type", "role"].map(|heading| left(heading, 0));
+        let numbers = ["messages", "Hz", "first, s", "last, s", "delay, ms"].map(|heading| right(heading, 0));
+        let rows = self.topics.iter().map(|topic| {
+            [
                 shortened(&topic.topic, WIDEST_NAME).into_owned(),
                 shortened(&topic.schema, WIDEST_NAME).into_owned(),
                 topic.role.clone(),
@@ -51,9 +52,9 @@ impl Display for CheckReport {
                 topic
                     .latency_s
                     .map_or_else(String::new, |latency| without_signed_zeros(format!("{:.1}", latency * 1e3))),
-            ]);
-        }
-        write_table(out, &rows)?;
+            ]
+        });
+        write!(out, "{}", TextTable::new(texts.into_iter().chain(numbers), rows))?;
         for severity in [Severity::Error, Severity::Warning, Severity::Note, Severity::Good] {
             let findings: Vec<_> = self.findings.iter().filter(|finding| finding.severity == severity).collect();
             if findings.is_empty() {
@@ -88,24 +89,3 @@ fn time_cell(time_s: f64) -> String {
 
 /// Characters of a topic or a type in the table; longer ones are truncated.
 const WIDEST_NAME: usize = 60;
-
-/// Writes columns as wide as their widest cell, numbers aligned to the right.
-fn write_table<const N: usize>(out: &mut Formatter<'_>, rows: &[[String; N]]) -> Result {
-    /// Columns before the numbers.
-    const FIRST_NUMBER: usize = 3;
-    let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
-    let widths: Vec<usize> = (0..N).map(width).collect();
-    for row in rows {
-        let mut line = String::new();
-        for (column, cell) in row.iter().enumerate() {
-            let width = widths[column];
-            if column < FIRST_NUMBER {
-                write!(line, "{cell:<width$}  ")?;
-            } else {
-                write!(line, "{cell:>width$}  ")?;
-            }
-        }
-        writeln!(out, "  {}", line.trim_end())?;
-    }
-    Ok(())
-}

@@ -10,6 +10,7 @@ use super::super::analysis::measured_information;
 use crate::estimator::{HypotheticalFrame, HypotheticalLandmark, HypotheticalWindow, Motion};
 use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::{Chain, ParameterNames};
+use crate::table::text::{TextTable, left, right};
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Excitation {
@@ -127,21 +128,13 @@ impl fmt::Display for Excitation {
             "information gain   bit/s (one bit halves σ) over {:.2} s: all, and the loss without one motion of the vehicle\n                   (IMU axes) or of one of {joints} joints",
             self.duration_s
         )?;
-        let width = |name: &str| name.len().max(6) + 2;
-        write!(out, "  {:<12}{:>8}", "", "all")?;
-        for name in &self.motions {
-            write!(out, "{name:>width$}", width = width(name))?;
-        }
-        writeln!(out)?;
-        for parameter in &self.parameters {
-            write!(out, "  {:<12}{:>8.2}", parameter.name, parameter.bits_per_s)?;
-            for (name, missing) in self.motions.iter().zip(&parameter.by_motion) {
-                // Rounding errors count as zero.
-                let missing = if missing.abs() < 0.005 { 0.0 } else { *missing };
-                write!(out, "{missing:>width$.2}", width = width(name))?;
-            }
-            writeln!(out)?;
-        }
-        Ok(())
+        let motions = self.motions.iter().map(|name| right(name.as_str(), name.len().max(6) + 2));
+        let rows = self.parameters.iter().map(|parameter| {
+            // Rounding errors count as zero.
+            let missing = parameter.by_motion.iter().map(|bits| if bits.abs() < 0.005 { 0.0 } else { *bits });
+            let bits = [parameter.bits_per_s].into_iter().chain(missing).map(|bits| format!("{bits:.2}"));
+            [parameter.name.clone()].into_iter().chain(bits).collect::<Vec<_>>()
+        });
+        write!(out, "{}", TextTable::new([left("", 12), right("all", 8)].into_iter().chain(motions), rows))
     }
 }

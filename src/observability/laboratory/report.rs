@@ -9,6 +9,7 @@ use super::{FRAME_PERIOD_S, LaboratoryResult, LaboratorySetup, PIXEL_SIGMA_PX};
 use crate::estimator::{JointKnowledge, PoseKnowledge};
 use crate::gimbal::ParameterNames;
 use crate::observability::{CalibrationDirection, Deficit};
+use crate::table::text::{TextTable, left, right};
 use crate::text::Named as _;
 
 /// Results of an experiment in several parameterizations.
@@ -202,8 +203,6 @@ impl fmt::Display for DirectionReport {
     }
 }
 
-const LABEL: usize = 30;
-
 impl fmt::Display for LaboratoryReport {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         let plural = if self.joint_count == 1 { "" } else { "s" };
@@ -222,7 +221,7 @@ impl fmt::Display for LaboratoryReport {
             "window     {} frames every {} s, {} landmarks, pixel σ {} px; columns scaled by 10° and 3 cm\n",
             self.frames, self.frame_period_s, self.landmarks, self.pixel_sigma_px
         )?;
-        self.write_columns(out)?;
+        write!(out, "{}", self.by_form())?;
         for form in &self.forms {
             writeln!(out, "\n{form}")?;
         }
@@ -231,31 +230,32 @@ impl fmt::Display for LaboratoryReport {
 }
 
 impl LaboratoryReport {
-    fn write_columns(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let width = |form: &FormReport| form.form.len().max(9) + 2;
-        let line = |out: &mut fmt::Formatter<'_>, label: &str, cell: &dyn Fn(&FormReport) -> String| {
-            write!(out, "{label:<LABEL$}")?;
-            for form in &self.forms {
-                write!(out, "{:>width$}", cell(form), width = width(form))?;
-            }
-            writeln!(out)
+    /// Ranks and deficits with a column per parameterization.
+    fn by_form(&self) -> TextTable {
+        /// Label, and the text of a form.
+        type Row<'a> = (&'a str, &'a dyn Fn(&FormReport) -> String);
+        let least_observable = |form: &FormReport| {
+            let least = form.rank_structural.checked_sub(1).map(|index| form.singular_values[index]);
+            least.map_or_else(|| "-".to_owned(), |value| format!("{value:.3}"))
         };
-        line(out, "", &|form| form.form.clone())?;
-        line(out, "columns", &|form| form.names.len().to_string())?;
-        line(out, "structural rank", &|form| form.rank_structural.to_string())?;
-        line(out, "informed rank", &|form| form.rank_informed.to_string())?;
-        line(out, "lost to the parameterization", &|form| form.deficit.parameterization.to_string())?;
-        line(out, "lost to stationary joints", &|form| form.deficit.joints.to_string())?;
-        line(out, "absorbed by free angles", &|form| form.deficit.absorbed.to_string())?;
-        line(out, "lost to the motion", &|form| form.deficit.motion.to_string())?;
-        line(out, "smallest singular value > 0", &|form| {
-            let least_observable = form.rank_structural.checked_sub(1).map(|index| form.singular_values[index]);
-            least_observable.map_or_else(|| "-".to_owned(), |value| format!("{value:.3}"))
-        })?;
-        line(out, "least singularity margin", &|form| {
+        let least_margin = |form: &FormReport| {
             let least = form.margins.iter().min_by(|a, b| a.margin.total_cmp(&b.margin));
             least.map_or_else(|| "-".to_owned(), |margin| format!("{:.2}", margin.margin))
-        })
+        };
+        let rows: [Row<'_>; 9] = [
+            ("columns", &|form| form.names.len().to_string()),
+            ("structural rank", &|form| form.rank_structural.to_string()),
+            ("informed rank", &|form| form.rank_informed.to_string()),
+            ("lost to the parameterization", &|form| form.deficit.parameterization.to_string()),
+            ("lost to stationary joints", &|form| form.deficit.joints.to_string()),
+            ("absorbed by free angles", &|form| form.deficit.absorbed.to_string()),
+            ("lost to the motion", &|form| form.deficit.motion.to_string()),
+            ("smallest singular value > 0", &least_observable),
+            ("least singularity margin", &least_margin),
+        ];
+        let forms = self.forms.iter().map(|form| right(form.form.as_str(), form.form.len().max(9) + 2));
+        let rows = rows.map(|(label, cell)| [label.to_owned()].into_iter().chain(self.forms.iter().map(cell)));
+        TextTable::new([left("", 30)].into_iter().chain(forms), rows).not_indented()
     }
 }
 

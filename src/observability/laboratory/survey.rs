@@ -11,6 +11,7 @@ use super::spurious::{self, SpuriousRow};
 use super::{LaboratoryForm, LaboratoryResult};
 use crate::gimbal::{ParameterNames, Parameterization};
 use crate::observability::Deficit;
+use crate::table::text::{TextTable, left};
 use crate::text::Named as _;
 
 /// Number of frames for which a window is taken to have its largest rank.
@@ -162,15 +163,16 @@ impl fmt::Display for DegeneracySurvey {
              = number of its closed-form null directions that the computed Jacobian confirms."
         )?;
         for section in &self.sections {
-            writeln!(out, "\n{}", section.title)?;
-            for row in &section.rows {
-                writeln!(out, "{row}")?;
-            }
+            let columns = [42, 46, 12, 7, 0].map(|width| left("", width));
+            let rows = section.rows.iter().map(SurveyRow::texts);
+            write!(out, "\n{}\n{}", section.title, TextTable::new(columns, rows))?;
         }
         writeln!(out, "\nSmallest number of frames for full rank, minimal parameterization (three joints, generic)")?;
-        for MinFramesRow { scenario, columns, rank, frames } in &self.least_frames {
-            writeln!(out, "  {scenario:<42}M {rank}/{columns} from {frames} frames")?;
-        }
+        let rows = self.least_frames.iter().map(|row| {
+            let MinFramesRow { scenario, columns, rank, frames } = row;
+            [scenario.clone(), format!("M {rank}/{columns} from {frames} frames")]
+        });
+        write!(out, "{}", TextTable::new([left("", 42), left("", 0)], rows))?;
         writeln!(
             out,
             "\nStructural rank of the chain, null directions that sensor columns add to its own (timeshift: camera and encoders;\n\
@@ -187,8 +189,8 @@ impl fmt::Display for DegeneracySurvey {
     }
 }
 
-impl fmt::Display for SurveyRow {
-    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+impl SurveyRow {
+    fn texts(&self) -> [String; 5] {
         let ranks: Vec<String> =
             self.entries.iter().map(|entry| format!("{} {}/{}", entry.column, entry.rank, entry.columns)).collect();
         let deficit = self.deficit.as_ref().map_or_else(String::new, Deficit::short);
@@ -198,8 +200,7 @@ impl fmt::Display for SurveyRow {
         } else {
             format!("  null of M: {}", short_list(&self.null_of_minimal))
         };
-        let row = format!("  {:<42}{:<46}{deficit:<12}{known:<7}{null}", self.scenario, ranks.join("  "));
-        write!(out, "{}", row.trim_end())
+        [self.scenario.clone(), ranks.join("  "), deficit, known, null]
     }
 }
 

@@ -19,6 +19,7 @@ use super::windows::{WindowLayout, joined, rows_of_interval, trajectory};
 use crate::geometry::SplitMix64;
 use crate::gimbal::ParameterId;
 use crate::simulation::MotionSplines;
+use crate::table::text::{TextTable, left, right};
 
 /// Options of a plan beside the situation.
 #[derive(Clone, Debug, PartialEq)]
@@ -290,14 +291,16 @@ impl fmt::Display for MotionPlan {
                 self.duration_s, listed.words, listed.worst_ratio, listed.worst, listed.mean_ratio
             )?;
         }
-        writeln!(out, "criterion by start         before   after")?;
-        for start in &self.starts {
-            writeln!(out, "  {:<32}{:>6.3}{:>8.3}", start.origin, start.before, start.after)?;
-        }
-        writeln!(out, "limits                             reached     limit")?;
-        for limit in &self.limits {
-            writeln!(out, "  {:<28}{:>12.3}{:>10.3} {}", limit.quantity, limit.reached, limit.limit, limit.unit)?;
-        }
-        Ok(())
+        let starts = self.starts.iter().map(|start| {
+            [format!("  {}", start.origin), format!("{:.3}", start.before), format!("{:.3}", start.after)]
+        });
+        let columns = [left("criterion by start", 34), right("before", 6), right("after", 8)];
+        write!(out, "{}", TextTable::new(columns, starts).not_indented())?;
+        let limits = self.limits.iter().map(|limit| {
+            let [reached, allowed] = [limit.reached, limit.limit].map(|value| format!("{value:.3}"));
+            [format!("  {}", limit.quantity), reached, allowed, format!(" {}", limit.unit)]
+        });
+        let columns = [left("limits", 30), right("reached", 12), right("limit", 10), left("", 0)];
+        write!(out, "{}", TextTable::new(columns, limits).not_indented())
     }
 }

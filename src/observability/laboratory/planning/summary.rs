@@ -9,6 +9,7 @@ use super::super::Situation;
 use super::objective::Objective;
 use crate::geometry::Dimension;
 use crate::observability::Determination;
+use crate::table::text::{TextTable, left, right};
 use crate::text::Named as _;
 
 /// Prior and predicted σ of one parameter.
@@ -87,8 +88,8 @@ impl SigmaRow {
 
 impl fmt::Display for PlanTable {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(out, "predicted σ at the end\n  {:<16}{:>12}{:>12}{:>10}", "", "prior", "after", "ratio")?;
-        for parameter in &self.parameters {
+        let columns = [left("", 16), right("prior", 12), right("after", 12), right("ratio", 10), left("", 0)];
+        let rows = self.parameters.iter().map(|parameter| {
             let (factor, unit) = match parameter.dimension {
                 Dimension::Angle => (1_f64.to_degrees(), "°"),
                 _ => (1e3, " mm"),
@@ -96,9 +97,10 @@ impl fmt::Display for PlanTable {
             let [prior, after] =
                 [parameter.prior_sigma, parameter.sigma].map(|sigma| format!("{:.3}{unit}", sigma * factor));
             let note = if parameter.matters { "" } else { ", not in the criterion" };
-            let verdict = parameter.verdict.name();
-            writeln!(out, "  {:<16}{prior:>12}{after:>12}{:>10.3}  {verdict}{note}", parameter.name, parameter.ratio)?;
-        }
+            let verdict = format!("  {}{note}", parameter.verdict.name());
+            [parameter.name.clone(), prior, after, format!("{:.3}", parameter.ratio), verdict]
+        });
+        write!(out, "predicted σ at the end\n{}", TextTable::new(columns, rows))?;
         writeln!(out, "largest σ/prior {:.3} ({}), mean {:.3}", self.worst_ratio, self.worst, self.mean_ratio)
     }
 }

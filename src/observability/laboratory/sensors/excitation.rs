@@ -10,6 +10,7 @@ use super::{LaboratoryForm, LaboratorySetup, linearize_sensors};
 use crate::gimbal::{ParameterGroup, ParameterId};
 use crate::observability::analysis::measured_block;
 use crate::observability::laboratory::LaboratoryMotion;
+use crate::table::text::{TextTable, left, right};
 use crate::text::Named as _;
 
 /// Motions that are compared, each for the duration of the experiment.
@@ -80,21 +81,14 @@ fn sigmas(
 
 impl fmt::Display for SensorExcitation {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        const NAME: usize = 24;
         writeln!(out, "σ of sensor columns after each motion, in units of the column scale (1: not constrained)")?;
-        let width = |name: &str| name.len().max(5) + 2;
-        write!(out, "  {:<NAME$}", "")?;
-        for name in &self.motions {
-            write!(out, "{name:>width$}", width = width(name))?;
-        }
-        writeln!(out, "  suggested")?;
-        for parameter in &self.parameters {
-            write!(out, "  {:<NAME$}", parameter.name)?;
-            for (name, sigma) in self.motions.iter().zip(&parameter.sigmas) {
-                write!(out, "{sigma:>width$.3}", width = width(name))?;
-            }
-            writeln!(out, "  {}", parameter.suggested.as_deref().unwrap_or("-"))?;
-        }
-        Ok(())
+        let motions = self.motions.iter().map(|name| right(name.as_str(), name.len().max(5) + 2));
+        let columns = [left("", 24)].into_iter().chain(motions).chain([left("  suggested", 0)]);
+        let rows = self.parameters.iter().map(|parameter| {
+            let sigmas = parameter.sigmas.iter().map(|sigma| format!("{sigma:.3}"));
+            let suggested = format!("  {}", parameter.suggested.as_deref().unwrap_or("-"));
+            [parameter.name.clone()].into_iter().chain(sigmas).chain([suggested]).collect::<Vec<_>>()
+        });
+        write!(out, "{}", TextTable::new(columns, rows))
     }
 }

@@ -10,6 +10,7 @@ use super::experiments::{SECTIONS, SensorExperiment};
 use super::table::{SetRank, set_ranks};
 use crate::gimbal::{ParameterGroup, ParameterNames, Parameterization};
 use crate::observability::laboratory::SensorColumns;
+use crate::table::text::{TextTable, left};
 use crate::text::Named as _;
 
 /// Experiments with columns of sensors under one heading.
@@ -116,28 +117,19 @@ fn grouped(names: &[String]) -> String {
 impl fmt::Display for SensorSurveySection {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(out, "{} (minimal parameterization)", self.title)?;
-        write!(out, "  {:<28}{:<9}", "", "chain")?;
-        for (heading, _) in &SETS[1..] {
-            write!(out, "{heading:<11}")?;
-        }
-        writeln!(out)?;
+        let sets = SETS[1..].iter().map(|(heading, _)| left(*heading, 11));
+        let columns = [left("", 28), left("chain", 9)].into_iter().chain(sets).chain([left("", 0)]);
+        let mut rows = Vec::new();
         for row in &self.rows {
-            let (chain, sensors) = match row.sets.split_first() {
-                Some((chain, sensors)) => (format!("{}/{}", chain.rank, chain.count), sensors),
-                None => (String::new(), &[][..]),
-            };
-            write!(out, "  {:<28}{chain:<9}", row.motion)?;
-            for (place, set) in sensors.iter().enumerate() {
-                let added = format!("+{}", set.added);
-                // No padding after the last entry if no parameters follow.
-                let width = if place + 1 == sensors.len() && row.lost.is_empty() { 0 } else { 11 };
-                write!(out, "{added:<width$}")?;
-            }
-            writeln!(out, "{}", grouped(&row.lost))?;
+            let Some((chain, sensors)) = row.sets.split_first() else { continue };
+            let mut cells = vec![row.motion.clone(), format!("{}/{}", chain.rank, chain.count)];
+            cells.extend(sensors.iter().map(|set| format!("+{}", set.added)));
+            cells.push(grouped(&row.lost));
+            rows.push(cells);
             if !row.cause.is_empty() {
-                writeln!(out, "  {:<28}{}", "", row.cause)?;
+                rows.push(vec![String::new(), row.cause.clone()]);
             }
         }
-        Ok(())
+        write!(out, "{}", TextTable::new(columns, rows))
     }
 }
