@@ -1,17 +1,16 @@
 //! Prior on the columns common to all frame sets: extrinsics of the static camera, time offsets and chain, from the rig
-//! or from earlier flights.
+//! or from earlier flights; the prior on the chain alone, as a least-squares term.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use super::chain_prior::ChainTerm;
-use super::input::{CalibrationInput, EarlierFlights};
-use super::options::CalibrationOptions;
+use super::input::{CalibrationInput, CalibrationOptions, EarlierFlights};
 use super::state::{BundleEstimate, Columns};
 use crate::estimator::factors::factor::{Factor, JacobianBlock, Sink, WhitenedRows};
 use crate::estimator::factors::kind::FactorLabel;
 use crate::geometry::{RigidTransform, so3};
-use crate::gimbal::{Chain, ParameterId, auto_parameterization};
-use crate::optimization::prior_square_root_information;
+use crate::gimbal::{Chain, ClassicalChain, ParameterId, Parameterization, auto_parameterization};
+use crate::optimization::{MIN_PRIOR_VARIANCE, prior_square_root_information};
+use crate::sensors::ChainPrior;
 
 /// Expected values of the border with their information.
 #[derive(Clone, Debug)]
@@ -157,5 +156,41 @@ impl Factor for BorderPriorFactor<'_> {
         let (jacobian, residual) = self.jacobian_and_residual();
         let blocks = [JacobianBlock { start: self.columns.band(), entries: jacobian.as_slice() }];
         sink.add(self.label(), &WhitenedRows { residual: residual.as_slice(), blocks: &blocks, products: None });
+    }
+}
+
+/// Given chain with its prior.
+#[derive(Clone, Debug)]
+pub(super) struct ChainTerm {
+    pub(super) given: Chain,
+    /// Prior standard deviation of each column.
+    pub(super) prior_sigmas: DVector<f64>,
+    /// `W` with `WᵀW` the inverse of the prior covariance.
+    square_root_information: DMatrix<f64>,
+}
+
+impl ChainTerm {
+    /// Rig's prior on its chain in a parameterization.
+    pub(super) fn new(classical: &ClassicalChain, prior: &ChainPrior, parameterization: Parameterization) -> Self {
+        let given = Chain::from_classical(classical, parameterization);
+        let (translation_m, rotation_rad) = prior.sigmas();
+        let covariance = given.prior_covariance(classical, translation_m, rotation_rad);
+        Self::with_covariance(given, covariance)
+    }
+
+    /// Prior with this covariance of the chain's columns (dof × dof).
+    pub(super) fn with_covariance(given: Chain, covariance: DMatrix<f64>) -> Self {
+        let prior_sigmas = covariance.diagonal().map(|variance| (variance + MIN_PRIOR_VARIANCE).sqrt());
+        Self { given, prior_sigmas, square_root_information: prior_square_root_information(covariance) }
+    }
+
+    /// Whitened difference `W·(chain ⊟ given)` (dof × 1).
+    pub(super) fn residual(&self, chain: &Chain) -> DVector<f64> {
+        &self.square_root_information * chain.minus(&self.given)
+    }
+
+    /// Derivative of the residual with respect to a step (dof × dof).
+    pub(super) fn jacobian(&self) -> &DMatrix<f64> {
+        &self.square_root_information
     }
 }

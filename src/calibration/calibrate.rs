@@ -4,10 +4,8 @@ use std::ops::ControlFlow;
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use super::batch::batch_trajectory;
-use super::border_prior::BorderTerm;
+use super::border_prior::{BorderTerm, ChainTerm};
 use super::bundle::{Priors, gimbal_view};
-use super::chain_prior::ChainTerm;
 use super::frame_sets::{FrameSet, ImuBuffer, frame_sets};
 use super::outcome::{
     CalibratedParameter, CalibrationOutcome, ExtrinsicsReport, ImuResidualReport, PixelReport, PoseLoopReport,
@@ -17,7 +15,7 @@ use super::pose_loop::{PoseLoopSolution, PoseLoops, paired};
 use super::rounds::{Stage, StageResult};
 use super::segments::{self, Segment, SegmentCounts};
 use super::state::{BundleEstimate, Camera, Columns};
-use super::trajectory::InitialTrajectory;
+use super::trajectory::{InitialTrajectory, batch_trajectory};
 use super::{CalibrationError, CalibrationInput, CalibrationOptions, observations, trajectory};
 use crate::estimator::factors::start_prior::StartPrior;
 use crate::estimator::{

@@ -15,17 +15,14 @@
 //! The chain uses its best minimal parameterization, in which every column is observable under sufficient excitation.
 
 mod arrow;
-mod batch;
 mod border_prior;
 mod bundle;
 mod calibrate;
-mod chain_prior;
 mod error;
 mod frame_sets;
 mod imu_noise;
 mod input;
 mod observations;
-mod options;
 mod outcome;
 mod pairs;
 mod pose_loop;
@@ -39,14 +36,12 @@ mod tests;
 mod trajectory;
 mod visual;
 
-pub use batch::BatchPose;
 pub use calibrate::{CalibrationProgress, calibrate, calibrate_along};
 pub use error::CalibrationError;
 pub use imu_noise::{FittedDensity, FlightNoise, ImuNoiseError, NoiseDensity, fit_imu_noise};
-pub use input::{CalibrationInput, EarlierFlights, GimbalCamera, StaticCamera, TrackedView};
-pub use options::CalibrationOptions;
+pub use input::{CalibrationInput, CalibrationOptions, EarlierFlights, GimbalCamera, StaticCamera, TrackedView};
 pub use outcome::{
     CalibratedParameter, CalibrationOutcome, ChainDistance, ExtrinsicsReport, ImuResidualReport, PixelReport,
     PoseLoopReport, Statistics, transform_distance,
 };
-pub use trajectory::InitialTrajectory;
+pub use trajectory::{BatchPose, InitialTrajectory};

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::batch::BatchPose;
+use super::trajectory::BatchPose;
 use crate::estimator::CalibrationPosterior;
 use crate::geometry::{RigidTransform, median, so3};
 use crate::gimbal::{ClassicalChain, ParameterId, Parameterization};

@@ -6,7 +6,7 @@
 
 use nalgebra::{DMatrix, Matrix3, Matrix6xX, UnitQuaternion, Vector3, Vector6};
 
-use super::chain_prior::ChainTerm;
+use super::border_prior::ChainTerm;
 use super::segments::Segment;
 use crate::estimator::factors::encoder::EncoderResidual;
 use crate::geometry::{RigidTransform, median, so3};

@@ -10,11 +10,10 @@ use crate::estimator::factors::reprojection::{Anchor, RobustWeight, VisualModel,
 use crate::estimator::report::jacobian_source::block_norms;
 use crate::estimator::report::{FeatureReport, JacobianFactor, JacobianRow, JacobianSource, StepReport};
 use crate::estimator::state::camera_pose::{self, CameraCalibration, CameraMaps};
-use crate::estimator::state::camera_view::{CameraView, ROLLING_BLOCKS};
+use crate::estimator::state::camera_view::{CameraView, ROLLING_BLOCKS, TrackObservation};
 use crate::estimator::state::columns::{ColumnBlock, ColumnId, FrameId, scales_of};
 use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::state::layout::{Layout, POSE, VELOCITY_BIAS};
-use crate::estimator::state::track::TrackObservation;
 use crate::frontend::FeatureId;
 use crate::optimization::{BlockTerm, CameraPose, Landmark, RobustLoss};
 

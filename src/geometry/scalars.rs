@@ -1,4 +1,4 @@
-//! Small functions of numbers: time units, angles, lengths in the image plane, tangent plane of a direction,
+//! Small functions of numbers: time units and intervals, angles, lengths in the image plane, tangent plane of a direction,
 //! ticks of an axis.
 
 use std::f64::consts::{PI, TAU};
@@ -12,6 +12,11 @@ pub fn seconds_from_ns(time_ns: i64) -> f64 {
 /// Rounded to the nearest nanosecond.
 pub fn ns_from_seconds(time_s: f64) -> i64 {
     (time_s * 1e9).round() as i64
+}
+
+/// True if a time lies in an interval given as start and length, both in seconds; false without an interval.
+pub(crate) fn during(interval_s: Option<[f64; 2]>, time_s: f64) -> bool {
+    interval_s.is_some_and(|[start_s, length_s]| time_s >= start_s && time_s < start_s + length_s)
 }
 
 /// Rise from 0 to 1 over the same range of `fraction`, with first and second derivatives of zero at both ends.

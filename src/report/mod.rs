@@ -5,7 +5,6 @@
 mod content;
 mod html;
 mod inputs;
-mod numbers;
 mod page;
 mod rank_intervals;
 mod study;

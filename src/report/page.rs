@@ -4,10 +4,10 @@ use maud::{Markup, html};
 
 use super::content::{ReportContent, ReportFigure, RunContent};
 use super::html::{document, figure, icon, list, list_in_columns, unbroken};
-use super::numbers::number;
 use super::rank_intervals::RankInterval;
 use super::tables;
 use super::verdict::Statement;
+use crate::table::Medium::Page;
 
 pub(super) fn page(content: &ReportContent, figures: &[ReportFigure]) -> String {
     let title = format!("Flight report: {}", content.log);
@@ -64,7 +64,7 @@ fn lead(content: &ReportContent) -> String {
     let noun = if runs.len() == 1 { "run" } else { "runs" };
     format!(
         "Log of {} s, rig {}, {noun} {}. {}.",
-        number(content.duration_s, 1),
+        Page.fixed(content.duration_s, 1),
         content.rig,
         runs.join(", "),
         content.program

@@ -8,7 +8,6 @@ use serde::Serialize;
 
 use super::content::ReportFigure;
 use super::html::{document, figure, table};
-use super::numbers::number;
 use crate::export::ExportError;
 use crate::export::existing::read_index;
 use crate::export::folder_files::json_text;
@@ -16,6 +15,7 @@ use crate::files::output;
 use crate::files::output::OutputSet;
 use crate::study::view::{GroupSummary, ParameterErrors};
 use crate::table::Column;
+use crate::table::Medium::Page;
 
 /// File that identifies the report of a study.
 const INDEX: &str = "report.json";
@@ -124,13 +124,13 @@ fn groups(report: &StudyReport) -> Markup {
     type GroupColumn<'a> = Column<'a, GroupSummary>;
     let significant = |value: f64| {
         let decimals = if value == 0.0 { 0.0 } else { (2.0 - value.abs().log10().floor()).clamp(0.0, 9.0) };
-        number(value, decimals as usize)
+        Page.fixed(value, decimals as usize)
     };
     let range = move |low: f64, high: f64| format!("{} to {}", significant(low), significant(high));
     let or_dash = |text: Option<String>| text.unwrap_or_else(|| "–".to_owned());
     let rate = |group: &GroupSummary| {
         let [rate, low, high] =
-            [group.success.rate, group.success.low, group.success.high].map(|it| number(100.0 * it, 1));
+            [group.success.rate, group.success.low, group.success.high].map(|it| Page.fixed(100.0 * it, 1));
         format!("{rate} % ({low} to {high})")
     };
     let mut columns = vec![

@@ -7,17 +7,17 @@ use maud::{Markup, html};
 use super::InputFile;
 use super::content::{ReportContent, ReportEvent, RunContent};
 use super::html::{cells, is_number, list_in_columns, table, table_of_texts, unbroken};
-use super::numbers::{MS_PER_S, number};
 use crate::log_check::{CheckReport, Finding, Severity, TopicReport};
 use crate::observability::Determination;
 use crate::session::{CalibrationRow, TrajectoryAccuracy, TrajectoryLane};
-use crate::table::{Column, Medium};
+use crate::table::Column;
+use crate::table::Medium::Page;
 
 /// Frame counts of each run.
 pub(super) fn frames(content: &ReportContent) -> Markup {
     type RunColumn<'a> = Column<'a, RunContent>;
     let initialized = |run: &RunContent| {
-        run.summary.frames.initialized_at_s.map_or_else(|| "never".to_owned(), |time_s| number(time_s, 2))
+        run.summary.frames.initialized_at_s.map_or_else(|| "never".to_owned(), |time_s| Page.fixed(time_s, 2))
     };
     let columns = [
         RunColumn::page("run", |run| run.label.clone()),
@@ -27,7 +27,7 @@ pub(super) fn frames(content: &ReportContent) -> Markup {
         RunColumn::page("keyframes", |run| run.summary.frames.keyframes),
         RunColumn::page("initialized at, s", initialized),
         RunColumn::page("restarts", |run| run.summary.frames.restarts),
-        RunColumn::page("path length, m", |run| number(run.summary.length_m, 1)),
+        RunColumn::page("path length, m", |run| Page.fixed(run.summary.length_m, 1)),
     ];
     table("Frames and path length", &columns, &content.runs)
 }
@@ -49,17 +49,17 @@ pub(super) fn accuracy(content: &ReportContent) -> Markup {
     lengths_m.dedup();
     let mut columns = vec![
         AccuracyColumn::page("run", |(label, _)| (*label).clone()),
-        AccuracyColumn::page("ATE RMSE, m", |(_, accuracy)| number(accuracy.ate_rmse_m, 4)),
-        AccuracyColumn::page("mean, m", |(_, accuracy)| number(accuracy.ate_mean_m, 4)),
-        AccuracyColumn::page("median, m", |(_, accuracy)| number(accuracy.ate_median_m, 4)),
-        AccuracyColumn::page("max, m", |(_, accuracy)| number(accuracy.ate_max_m, 4)),
-        AccuracyColumn::page("RMSE, % of length", |(_, accuracy)| number(accuracy.ate_percent_of_length, 3)),
+        AccuracyColumn::page("ATE RMSE, m", |(_, accuracy)| Page.fixed(accuracy.ate_rmse_m, 4)),
+        AccuracyColumn::page("mean, m", |(_, accuracy)| Page.fixed(accuracy.ate_mean_m, 4)),
+        AccuracyColumn::page("median, m", |(_, accuracy)| Page.fixed(accuracy.ate_median_m, 4)),
+        AccuracyColumn::page("max, m", |(_, accuracy)| Page.fixed(accuracy.ate_max_m, 4)),
+        AccuracyColumn::page("RMSE, % of length", |(_, accuracy)| Page.fixed(accuracy.ate_percent_of_length, 3)),
     ];
     columns.extend(lengths_m.into_iter().map(|length_m| {
         AccuracyColumn::page(format!("RPE over {length_m} m"), move |(_, accuracy)| {
             let relative = accuracy.rpe.iter().find(|relative| relative.delta_m == length_m)?;
             let (translation_m, rotation_deg) = (relative.translation_rmse_m, relative.rotation_rmse_deg);
-            Some(format!("{} m, {}°", number(translation_m, 3), number(rotation_deg, 2)))
+            Some(format!("{} m, {}°", Page.fixed(translation_m, 3), Page.fixed(rotation_deg, 2)))
         })
     }));
     let mut rows = Vec::new();
@@ -71,7 +71,7 @@ pub(super) fn accuracy(content: &ReportContent) -> Markup {
     }
     table_of_texts(
         "Absolute trajectory error (ATE) after alignment by yaw and position; relative pose error (RPE, RMSE)",
-        columns.iter().filter_map(|column| column.heading(Medium::Page)),
+        columns.iter().filter_map(|column| column.heading(Page)),
         &rows,
     )
 }
@@ -84,7 +84,7 @@ pub(super) fn trajectories(content: &ReportContent) -> Option<Markup> {
         LaneColumn::page("trajectory", |lane| lane.label.clone()),
         LaneColumn::page("file or topic", |lane| lane.source.clone()),
         LaneColumn::page("poses", |lane| lane.track.samples().len()),
-        LaneColumn::page("path length, m", |lane| number(lane.length_m, 1)),
+        LaneColumn::page("path length, m", |lane| Page.fixed(lane.length_m, 1)),
     ];
     let caption = "Trajectories of other programs: poses only, without calibration, features and residuals";
     (!lanes.is_empty()).then(|| table(caption, &columns, lanes))
@@ -97,14 +97,14 @@ pub(super) fn calibration(runs: &[RunContent]) -> Option<Markup> {
     calibrated.first()?;
     let all: Vec<CalibrationRow<'_>> = calibrated.iter().flat_map(|run| rows_of(run)).collect();
     let mut columns = CalibrationRow::columns();
-    columns.retain(|column| column.is_shown(Medium::Page, all.iter()));
+    columns.retain(|column| column.is_shown(Page, all.iter()));
     Some(html! {
         p.rule {
             "Values at the end; verdicts of the whole flight (" (Determination::RULE)
             "). Below a parameter that is not determined: the reason, and what helps."
         }
         table.calibration {
-            thead { tr { @for column in &columns { th scope="col" { (column.heading(Medium::Page).unwrap_or_default()) } } } }
+            thead { tr { @for column in &columns { th scope="col" { (column.heading(Page).unwrap_or_default()) } } } }
             @for run in calibrated {
                 tbody.run {
                     tr {
@@ -152,7 +152,7 @@ pub(super) fn events(run: &RunContent) -> Markup {
     type EventColumn<'a> = Column<'a, ReportEvent>;
     let times = |event: &ReportEvent| (event.times > 1).then(|| format!("{} consecutive frames", event.times));
     let columns = [
-        EventColumn::page("time, s", |event| number(event.time_s, 2)),
+        EventColumn::page("time, s", |event| Page.fixed(event.time_s, 2)),
         EventColumn::page("event", |event| event.kind.clone()),
         EventColumn::page("message", |event| event.message.clone()),
         EventColumn::page("", times),
@@ -191,9 +191,11 @@ pub(super) fn topics(check: &CheckReport) -> Markup {
         TopicColumn::page("type", |topic| topic.schema.clone()),
         TopicColumn::page("role", |topic| topic.role.clone()),
         TopicColumn::page("messages", |topic| topic.count),
-        TopicColumn::page("rate, Hz", |topic| number(topic.rate_hz, 1)),
-        TopicColumn::page("stamps, s", |topic| format!("{} to {}", number(topic.first_s, 2), number(topic.last_s, 2))),
-        TopicColumn::page("median delay, ms", |topic| topic.latency_s.map(|latency_s| number(latency_s * MS_PER_S, 1))),
+        TopicColumn::page("rate, Hz", |topic| Page.fixed(topic.rate_hz, 1)),
+        TopicColumn::page("stamps, s", |topic| {
+            format!("{} to {}", Page.fixed(topic.first_s, 2), Page.fixed(topic.last_s, 2))
+        }),
+        TopicColumn::page("median delay, ms", |topic| topic.latency_s.map(|latency_s| Page.fixed(latency_s * 1e3, 1))),
     ];
     table("Topics", &columns, &check.topics)
 }

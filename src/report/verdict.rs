@@ -2,7 +2,6 @@
 
 use serde::Serialize;
 
-use super::numbers::number;
 use crate::calibration::ChainDistance;
 use crate::geometry::{Dimension, seconds_from_ns};
 use crate::log_check::{CheckReport, Severity};
@@ -12,6 +11,7 @@ use crate::session::{
     FlightParameter, LostSince, PoseError, Recording, RunRecord, RunSummary, StepRecord, flight_headline,
     least_determined, run_warning_lines,
 };
+use crate::table::Medium::Page;
 use crate::table::Shown;
 
 /// Largest trajectory error, in percent of the path length, with a good mark.
@@ -69,14 +69,14 @@ fn accuracy(recording: &Recording, run: &RunRecord, summary: &RunSummary) -> Sta
     let uncertainty = last.map(|(last, covariance)| {
         let text = format!(
             "at {} s position ±{}, attitude ±{}° (1σ, relative to the first estimated frame)",
-            number(seconds_from_ns(last.report.stamp_ns), 2),
+            Page.fixed(seconds_from_ns(last.report.stamp_ns), 2),
             length(covariance.position_sigma_m()),
-            number(covariance.attitude_sigma_rad().to_degrees(), 2)
+            Page.fixed(covariance.attitude_sigma_rad().to_degrees(), 2)
         );
         match nees {
             Some(nees) => format!(
                 "{text}; squared error over covariance {} on average (NEES, 6 when consistent)",
-                number(nees, 1)
+                Page.fixed(nees, 1)
             ),
             None => text,
         }
@@ -88,7 +88,7 @@ fn accuracy(recording: &Recording, run: &RunRecord, summary: &RunSummary) -> Sta
                     "over {} m {}, {}°",
                     over.delta_m,
                     length(over.translation_rmse_m),
-                    number(over.rotation_rmse_deg, 2)
+                    Page.fixed(over.rotation_rmse_deg, 2)
                 )
             });
             let relative: Vec<String> = relative.collect();
@@ -166,7 +166,7 @@ fn observability(recording: &Recording, run: &RunRecord) -> Option<Statement> {
     let columns = rank.parameters.len();
     let text = format!(
         "Last window, at {} s: structural rank {} of {columns}, informed rank {}.",
-        number(seconds_from_ns(step.report.stamp_ns), 2),
+        Page.fixed(seconds_from_ns(step.report.stamp_ns), 2),
         rank.rank_structural,
         rank.rank_informed
     );
@@ -181,7 +181,7 @@ fn observability(recording: &Recording, run: &RunRecord) -> Option<Statement> {
     if let Some((most, stamp_ns)) = best.max_by_key(|(informed, stamp_ns)| (*informed, std::cmp::Reverse(*stamp_ns)))
         && most > rank.rank_informed
     {
-        let at_s = number(seconds_from_ns(stamp_ns), 2);
+        let at_s = Page.fixed(seconds_from_ns(stamp_ns), 2);
         details.push(format!("Largest informed rank of the run: {most} at {at_s} s."));
     }
     if let Some((parameter, motion)) = rank.sensor_excitation() {
@@ -223,7 +223,7 @@ fn why(rank: &RankReport, step: &StepRecord) -> Vec<String> {
             "{} because the motion in the window ({} frames, {} s) constrains {} less than a prior of 10° or 3 cm.",
             if uninformed == 1 { "1 direction is uninformed" } else { "Directions are uninformed" },
             step.report.window.len(),
-            number(window_s, 1),
+            Page.fixed(window_s, 1),
             if uninformed == 1 { "it".to_owned() } else { format!("{uninformed} of them") }
         ));
     }
@@ -235,7 +235,7 @@ fn estimation(run: &RunRecord, summary: &RunSummary) -> Statement {
     let (frames, warnings) = (&summary.frames, run_warning_lines(run).len());
     let initialized = frames
         .initialized_at_s
-        .map_or_else(|| "never initialized".to_owned(), |at_s| format!("initialized at {} s", number(at_s, 2)));
+        .map_or_else(|| "never initialized".to_owned(), |at_s| format!("initialized at {} s", Page.fixed(at_s, 2)));
     let text = format!(
         "{} of {} images have an estimated pose; {initialized}; {}; {}.",
         frames.estimated,
@@ -288,11 +288,15 @@ pub(super) fn log_statement(check: Option<&CheckReport>, reader_warnings: &[Stri
 
 /// A length in millimetres below a decimetre, else in metres.
 fn length(value_m: f64) -> String {
-    if value_m < 0.1 { format!("{} mm", number(1e3 * value_m, 1)) } else { format!("{} m", number(value_m, 2)) }
+    if value_m < 0.1 { format!("{} mm", Page.fixed(1e3 * value_m, 1)) } else { format!("{} m", Page.fixed(value_m, 2)) }
 }
 
 fn chain_error(error: &ChainDistance) -> String {
-    format!("{} mm, {}°", number(error.translation_mean_m * 1e3, 1), number(error.rotation_mean_rad.to_degrees(), 2))
+    format!(
+        "{} mm, {}°",
+        Page.fixed(error.translation_mean_m * 1e3, 1),
+        Page.fixed(error.rotation_mean_rad.to_degrees(), 2)
+    )
 }
 
 /// A standard deviation with two digits and its unit.
@@ -300,7 +304,7 @@ fn sigma_text(dimension: Dimension, sigma: f64) -> String {
     let Shown { factor, unit } = Shown::of(dimension);
     let shown = sigma * factor;
     let decimals = if shown > 0.0 { (1.0 - shown.log10().floor()).clamp(0.0, 6.0) as usize } else { 0 };
-    format!("{}{unit}", number(shown, decimals))
+    format!("{}{unit}", Page.fixed(shown, decimals))
 }
 
 fn count(number: usize, noun: &str) -> String {

@@ -1,10 +1,10 @@
 //! Simulated sensor faults and calibration errors.
 
-use super::error::SimulationError;
 use std::ops::RangeInclusive;
 
-use super::interval::during;
+use super::error::SimulationError;
 use super::vibration::Vibration;
+use crate::geometry::during;
 use crate::sensors::CameraMount;
 use crate::text::{FINITE, Field, Key, Numbers, read_item};
 

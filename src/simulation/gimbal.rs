@@ -4,11 +4,10 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use super::aim::Aim;
 use super::exercise::Exercise;
-use super::interval::during;
 use super::random::RandomStream;
 use super::route::Wave;
 use super::trajectory::{Kinematics, Trajectory};
-use crate::geometry::{RigidTransform, so3};
+use crate::geometry::{RigidTransform, during, so3};
 use crate::gimbal::{ClassicalChain, DhLink};
 use crate::sensors::{GimbalRig, Joint};
 

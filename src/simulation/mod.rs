@@ -17,7 +17,6 @@ mod experiment;
 mod gimbal;
 mod gimbal_imu;
 mod imu;
-mod interval;
 mod motion;
 mod motion_samples;
 #[cfg(feature = "logs")]

@@ -15,7 +15,6 @@ use super::equipment::{Equipment, IntrinsicsError, JOINT_TOPIC};
 use super::error::SimulationError;
 use super::experiment::{Experiment, WorldKind};
 use super::gimbal::JointMotion;
-use super::interval::during;
 use super::options::{SimulationOptions, SimulationProgress, SimulationSummary};
 use super::prescribed::PrescribedFlight;
 use super::random::RandomStream;
@@ -28,7 +27,7 @@ use super::vibration::shake;
 use super::world;
 use crate::files::output::OutputSet;
 use crate::flight_log::{LogError, LogWriter, LogWriterOptions, MessageTimes, Odometry};
-use crate::geometry::{ns_from_seconds, seconds_from_ns, so3};
+use crate::geometry::{during, ns_from_seconds, seconds_from_ns, so3};
 use crate::sensors::{CameraRig, GimbalRig, ImuRig, ImuSample, JointSample, Rig};
 use crate::text::Named as _;
 

@@ -3,7 +3,7 @@
 use nalgebra::{DVector, UnitQuaternion, Vector3, Vector6};
 
 use crate::calibration::ChainDistance;
-use crate::calibration::chain_prior::ChainTerm;
+use crate::calibration::border_prior::ChainTerm;
 use crate::calibration::pose_loop::{LoopNoise, LoopState, PairedSegment, PoseLoops, PosePair, SegmentFrame};
 use crate::geometry::{RigidTransform, SplitMix64, so3, wrap_angle};
 use crate::gimbal::{Chain, ClassicalChain, Parameterization, auto_parameterization};

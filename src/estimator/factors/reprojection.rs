@@ -11,9 +11,7 @@ use nalgebra::Vector2;
 
 use crate::camera::CameraModel;
 use crate::estimator::config::EstimatorOptions;
-use crate::estimator::state::camera_view::{CameraView, ROLLING_BLOCKS, RelativeTo};
-use crate::estimator::state::track::Track;
-use crate::estimator::state::track::TrackObservation;
+use crate::estimator::state::camera_view::{CameraView, ROLLING_BLOCKS, RelativeTo, Track, TrackObservation};
 use crate::optimization::{
     BlockTerm, DensePoseEquations, Landmark, LandmarkModel, LossSum, ReducedEquations, ReprojectionEquations,
     RobustLoss, reprojection,

@@ -15,11 +15,10 @@ use crate::estimator::factors::reprojection::{
 };
 use crate::estimator::factors::start_prior::StartPrior;
 use crate::estimator::state::camera_pose::CameraMaps;
-use crate::estimator::state::camera_view::CameraView;
+use crate::estimator::state::camera_view::{CameraView, Track};
 use crate::estimator::state::estimate::Estimate;
 use crate::estimator::state::frame::Frame;
 use crate::estimator::state::layout::Layout;
-use crate::estimator::state::track::Track;
 use crate::optimization::Landmark;
 
 #[derive(Clone, Debug)]

@@ -1,4 +1,4 @@
-//! A camera of the window at one estimate: its model, and its pose at each observation.
+//! A camera of the window at one estimate: its model, and its pose at each observation of a track.
 
 use std::borrow::Cow;
 use std::cell::OnceCell;
@@ -8,7 +8,6 @@ use nalgebra::{Matrix2x6, Vector2, Vector3};
 use super::calibration::Calibration;
 use super::camera_pose::{self, CameraCalibration, ROLLING_ROWS};
 use super::frame_state::FrameState;
-use super::track::TrackObservation;
 use crate::camera::CameraModel;
 use crate::optimization::{CameraPose, PoseBlocksOf, RelativePose, RelativePoses};
 
@@ -217,4 +216,17 @@ impl<'a> RelativeTo<'a> {
             }
         }
     }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct TrackObservation {
+    pub(crate) slot: usize,
+    pub(crate) uv_px: Vector2<f64>,
+}
+
+/// Observations of one feature in the solve.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Track {
+    /// By ascending slot; the anchor's comes first.
+    pub(crate) observations: Vec<TrackObservation>,
 }

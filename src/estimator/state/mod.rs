@@ -22,4 +22,3 @@ pub(crate) mod motion_profile;
 pub(crate) mod navigation;
 pub mod preintegration;
 pub(crate) mod sensor_columns;
-pub(crate) mod track;

@@ -6,7 +6,7 @@ use nalgebra::{Vector2, Vector3};
 
 use crate::estimator::config::EstimatorOptions;
 use crate::estimator::state::camera_view::CameraView;
-use crate::estimator::state::track::{Track, TrackObservation};
+use crate::estimator::state::camera_view::{Track, TrackObservation};
 use crate::frontend::{FeatureId, TrackedFeature};
 use crate::optimization::{self, CameraPose, Landmark, LandmarkModel, Ray, TriangulationOptions};
 

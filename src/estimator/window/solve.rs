@@ -12,9 +12,9 @@ use crate::estimator::problem::linearization::Linearization;
 use crate::estimator::problem::problem::{CameraFactors, Problem};
 use crate::estimator::problem::solver::{self, Solution, SolverLimits};
 use crate::estimator::report::{Event, EventKind};
+use crate::estimator::state::camera_view::TrackObservation;
 use crate::estimator::state::columns::FrameId;
 use crate::estimator::state::estimate::Estimate;
-use crate::estimator::state::track::TrackObservation;
 use crate::geometry::median;
 
 /// Reprojection residuals in pixels, by track and observation; `None` behind the camera.

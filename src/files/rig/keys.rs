@@ -20,43 +20,29 @@ const ROOT: Keys = Keys {
 };
 /// Entries that this program appends to a rig for human readers.
 const APPENDICES: &[&str] = &["calibration", "truth"];
+/// Keys of every IMU, then of one on the gimbal, `imu1` with `mount: gimbal`.
+const IMU_KEYS: &[&str] = &[
+    "rostopic",
+    "accelerometer_rostopic",
+    "use_log_time",
+    "frame_id",
+    "update_rate",
+    "accelerometer_noise_density",
+    "accelerometer_random_walk",
+    "gyroscope_noise_density",
+    "gyroscope_random_walk",
+    "gyroscopes",
+    "accelerometers",
+    "mount",
+    "T_cam_imu",
+    "timeshift_imu1_imu",
+];
 /// Includes keys that Kalibr writes for its IMU models, and OpenVINS in the same files.
 const IMU: Keys = Keys {
-    read: &[
-        "rostopic",
-        "accelerometer_rostopic",
-        "use_log_time",
-        "frame_id",
-        "update_rate",
-        "accelerometer_noise_density",
-        "accelerometer_random_walk",
-        "gyroscope_noise_density",
-        "gyroscope_random_walk",
-        "gyroscopes",
-        "accelerometers",
-    ],
+    read: IMU_KEYS.split_at(IMU_KEYS.len() - 3).0,
     unused: &["model", "T_i_b", "time_offset", "Tw", "R_IMUtoGYRO", "Ta", "R_IMUtoACC", "Tg"],
 };
-/// IMU on the gimbal, `imu1` with `mount: gimbal`.
-const GIMBAL_IMU: Keys = Keys {
-    read: &[
-        "mount",
-        "rostopic",
-        "accelerometer_rostopic",
-        "use_log_time",
-        "frame_id",
-        "update_rate",
-        "accelerometer_noise_density",
-        "accelerometer_random_walk",
-        "gyroscope_noise_density",
-        "gyroscope_random_walk",
-        "gyroscopes",
-        "accelerometers",
-        "T_cam_imu",
-        "timeshift_imu1_imu",
-    ],
-    unused: IMU.unused,
-};
+const GIMBAL_IMU: Keys = Keys { read: IMU_KEYS, unused: IMU.unused };
 const CAMERA: Keys = Keys {
     read: &[
         "mount",

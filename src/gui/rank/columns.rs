@@ -4,8 +4,8 @@
 use egui::{Align2, Color32, Grid, Label, Rangef, Rect, RichText, Role, Stroke, Ui, WidgetInfo};
 use egui::{StrokeKind, pos2, vec2};
 
-use super::heat_map::paint_weight;
-use super::{groups, spectrum};
+use super::heat_map::{paint_groups, paint_weight, strip_width};
+use super::spectrum;
 use crate::gimbal::{ParameterId, ParameterNames};
 use crate::gui::PanelContext;
 use crate::gui::parameter_names::{meaning_of, part_of};
@@ -173,7 +173,7 @@ fn heat_map_ui(
         parameters.retain(|parameter| columns.iter().any(|column| weight(column, *parameter) >= MIN_WEIGHT_OF_ROW));
     }
     let rows_omitted = all_rows - parameters.len();
-    let strip_width = groups::strip_width(&parameters);
+    let strip = strip_width(&parameters);
     let row_height = (room / parameters.len().max(1) as f32).clamp(MIN_ROW_HEIGHT, MAX_ROW_HEIGHT);
     let size = vec2(ui.available_width(), HEADER + row_height * parameters.len() as f32);
     let (_, whole) = ui.allocate_space(size);
@@ -210,13 +210,13 @@ fn heat_map_ui(
     for (row, parameter) in parameters.iter().enumerate() {
         let top = whole.top() + HEADER + row as f32 * row_height;
         let line = Rect::from_min_size(pos2(whole.left(), top), vec2(whole.width(), row_height));
-        name_ui(ui, ctx, *parameter, line, strip_width);
+        name_ui(ui, ctx, *parameter, line, strip);
     }
-    if strip_width > 0.0 {
+    if strip > 0.0 {
         let top = |row: usize| whole.top() + HEADER + row as f32 * row_height;
         let rows = parameters.iter().enumerate();
         let rows = rows.map(|(row, parameter)| (parameter.group(), Rangef::new(top(row), top(row + 1))));
-        groups::paint_groups(ui.painter(), &theme, &rows.collect::<Vec<_>>(), whole.x_range());
+        paint_groups(ui.painter(), &theme, &rows.collect::<Vec<_>>(), whole.x_range());
     }
     let directions = (omitted > 0).then(|| counted(omitted, "more observable direction"));
     let rows = (rows_omitted > 0)

@@ -1,18 +1,18 @@
-//! Null and uninformed directions by parameter name: a heat map with the signed weights as text.
+//! Null and uninformed directions by parameter name: a heat map with the signed weights as text, its rows in groups.
 
 use egui::epaint::TextShape;
 use egui::{Align2, Painter, Rangef, Rect, RichText, Role, Sense, Stroke, StrokeKind, Ui, WidgetInfo, pos2, vec2};
 
-use super::groups;
-use crate::gimbal::ParameterId;
+use crate::gimbal::{ParameterGroup, ParameterId};
 use crate::gui::PanelContext;
 use crate::gui::parameter_names::{meaning_of, part_of};
-use crate::gui::theme::{self, Theme};
+use crate::gui::theme::{self, Theme, label_font};
 use crate::gui::under_pointer::{Item, offer_item};
 use crate::gui::units::{counted, fixed, significant};
 use crate::gui::widgets::describe;
 use crate::observability::{CalibrationDirection, RankReport, parameters_of};
 use crate::session::FlightParameter;
+use crate::text::Named as _;
 
 const HEADER_HEIGHT: f32 = 28.0;
 /// Height in points of the header of narrow columns, whose numbers are vertical.
@@ -49,8 +49,8 @@ pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, rank: &RankReport, imp
         ui.painter().layout_no_wrap(names.name(*parameter), theme::label_font(), theme.text).size().x
     };
     let widest = rank.parameters.iter().map(name_width).fold(0.0, f32::max);
-    let strip_width = groups::strip_width(&rank.parameters);
-    let name_width = strip_width + (widest + 8.0).clamp(*NAME_WIDTHS.start(), *NAME_WIDTHS.end());
+    let strip = strip_width(&rank.parameters);
+    let name_width = strip + (widest + 8.0).clamp(*NAME_WIDTHS.start(), *NAME_WIDTHS.end());
     let width = ui.available_width();
     let room = (width - name_width).max(MIN_COLUMN_WIDTH);
     let count = rank.directions.len().min((room / MIN_COLUMN_WIDTH) as usize).max(1);
@@ -70,14 +70,14 @@ pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, rank: &RankReport, imp
     for (place, row) in rows.iter().enumerate() {
         let top = rect.top() + header_height + place as f32 * row_height;
         let line = Rect::from_min_size(pos2(rect.left(), top), vec2(name_width + pitch * count as f32, row_height));
-        row_ui(ui, ctx, rank.parameters[*row], *row, directions, line, [strip_width, name_width, pitch]);
+        row_ui(ui, ctx, rank.parameters[*row], *row, directions, line, [strip, name_width, pitch]);
     }
-    if strip_width > 0.0 {
+    if strip > 0.0 {
         let top = |place: usize| rect.top() + header_height + place as f32 * row_height;
         let range = |place: usize| Rangef::new(top(place), top(place + 1));
         let rows = rows.iter().enumerate().map(|(place, row)| (rank.parameters[*row].group(), range(place)));
         let across = Rangef::new(rect.left(), rect.left() + name_width + pitch * count as f32);
-        groups::paint_groups(ui.painter(), &theme, &rows.collect::<Vec<_>>(), across);
+        paint_groups(ui.painter(), &theme, &rows.collect::<Vec<_>>(), across);
     }
     let mut notes = Vec::new();
     if let Some(largest) = omitted {
@@ -246,6 +246,41 @@ pub(super) fn paint_weight(painter: &Painter, theme: &Theme, weight: f64, cell: 
         return;
     };
     painter.text(cell.center(), Align2::CENTER_CENTER, text, theme::number_font(), Theme::text_on(ground));
+}
+
+/// Width of the names of groups in points.
+const STRIP_WIDTH: f32 = 15.0;
+
+/// Width in points of the group names; 0 if all parameters are of one group.
+pub(super) fn strip_width(parameters: &[ParameterId]) -> f32 {
+    let several = parameters.windows(2).any(|pair| pair[0].group() != pair[1].group());
+    if several { STRIP_WIDTH } else { 0.0 }
+}
+
+/// Paints the name of each group upwards at the left end of its rows if it fits, and lines between groups; `rows` are
+/// in order from top to bottom.
+pub(super) fn paint_groups(painter: &Painter, theme: &Theme, rows: &[(ParameterGroup, Rangef)], across: Rangef) {
+    for (number, chunk) in rows.chunk_by(|(a, _), (b, _)| a == b).enumerate() {
+        let [(group, first), .., (_, last)] = chunk else {
+            // A name rarely fits into a single row; only the line is drawn.
+            separator(painter, theme, number, chunk.first().map_or(0.0, |(_, row)| row.min), across);
+            continue;
+        };
+        separator(painter, theme, number, first.min, across);
+        let range = Rangef::new(first.min, last.max);
+        let galley = painter.layout_no_wrap(group.name().to_owned(), label_font(), theme.text_weak);
+        if galley.size().x <= range.span() {
+            let foot =
+                pos2(across.min + 0.5 * (STRIP_WIDTH - galley.size().y) - 1.0, range.center() + 0.5 * galley.size().x);
+            painter.add(TextShape::new(foot, galley, theme.text_weak).with_angle(-std::f32::consts::FRAC_PI_2));
+        }
+    }
+}
+
+fn separator(painter: &Painter, theme: &Theme, number: usize, y: f32, across: Rangef) {
+    if number > 0 {
+        painter.hline(across, y, Stroke::new(1.0, theme.text_weak));
+    }
 }
 
 #[cfg(test)]

@@ -4,7 +4,6 @@ mod advice;
 pub(super) mod columns;
 mod compare;
 mod flight;
-mod groups;
 mod heat_map;
 mod information;
 mod sections;
@@ -35,8 +34,7 @@ use super::theme::{CURVE_WIDTH, RunStyle, Theme};
 use super::widgets::empty_ui;
 use super::{CsvTable, Panel, PanelContext};
 use crate::gimbal::ParameterNames;
-use crate::observability::CalibrationDirection;
-use crate::observability::RankReport;
+use crate::observability::{CalibrationDirection, RankReport};
 use crate::session::{LostSince, RunRecord, StepRecord};
 use crate::table::{Column, csv};
 

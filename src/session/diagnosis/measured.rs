@@ -1,4 +1,8 @@
-//! Hypotheses that undo the faults which the check of a log measures.
+//! Faults that the check of a log finds, and hypotheses that undo those which it measures.
+
+use std::cell::OnceCell;
+use std::path::Path;
+use std::sync::Arc;
 
 use super::axes::PlausibleAxes;
 use super::hypotheses::{TrialHypothesis, ZOOM_S, axes_hypotheses, corrections, uses_encoders, wider_chain_priors};
@@ -6,8 +10,11 @@ use super::trial::DiagnosedRun;
 use super::tuning::rounded;
 use crate::estimator::SensorParameters;
 use crate::faults::{Fault, FaultKind, LONGEST_SHIFT_S, Sensor, Severity};
+use crate::flight_log::FlightLog;
 use crate::geometry::ns_from_seconds;
-use crate::log_check::Finding;
+use crate::log_check::{self, Finding};
+use crate::sensors::Rig;
+use crate::session::engine::image_rotations;
 use crate::session::plan::ForkChanges;
 
 /// Changes that undo measured faults.
@@ -105,6 +112,25 @@ fn column(
     let changes = ForkChanges { estimated: [columns].into(), ..ForkChanges::default() };
     let estimate = run.spec.calibrate.then(|| TrialHypothesis::change(cause, changes, parameters));
     (!is_estimated).then(|| estimate.into_iter().collect())
+}
+
+/// Result of the check of a log, made for the first run that needs it.
+#[derive(Debug, Default)]
+pub struct LogFaults {
+    found: OnceCell<Vec<Finding>>,
+}
+
+impl LogFaults {
+    /// At most three errors and warnings of the check, those with the largest effect on a result first; none if the log can
+    /// no longer be read.
+    pub(super) fn of(&self, log_path: &Path, rig: &Rig) -> &[Finding] {
+        self.found.get_or_init(|| {
+            let Ok(log) = FlightLog::open(log_path) else { return Vec::new() };
+            let log = Arc::new(log);
+            let rotations = image_rotations(&log, rig);
+            log_check::check(&log, Ok(rig), &rotations).verdict().first
+        })
+    }
 }
 
 #[cfg(test)]

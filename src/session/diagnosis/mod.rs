@@ -5,7 +5,7 @@
 //! - `trial`, `span`, `cost_bound`: a run computed again with a change, on a part of it, as long as it may be the best.
 //! - `hypotheses`, `axes`, `refinement`, `tuning`: the causes that are tried, with the values to try.
 //! - `scoring`, `ranking`: the best cause of each kind, and whether it is decisive.
-//! - `log_faults`, `measured`: faults that the check of the log measures, and the changes that undo them.
+//! - `measured`: faults that the check of the log measures, and the changes that undo them.
 //! - `statement`, `truth`, `outcome`: the result in words.
 //! - `diagnose`: the search.
 
@@ -14,7 +14,6 @@ mod axes;
 mod cost_bound;
 mod diagnose;
 mod hypotheses;
-mod log_faults;
 mod measured;
 mod misfit;
 mod outcome;
@@ -32,5 +31,5 @@ pub use agreement::AgreementValue;
 pub use diagnose::diagnose;
 #[cfg(test)]
 pub(in crate::session) use diagnose::diagnose_run;
-pub use log_faults::LogFaults;
+pub use measured::LogFaults;
 pub use outcome::{Diagnosis, DiagnosisVerdict, RankedCause, TruthAgreement, WaitingReason};

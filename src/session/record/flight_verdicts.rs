@@ -1,9 +1,10 @@
-//! Verdicts on the calibration parameters of a run, followed over the whole flight.
+//! Verdicts on the calibration parameters of a run, followed over the whole flight, and the table of them.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::flight_parameter::FlightParameter;
+use super::recording::Recording;
 use super::run::RunRecord;
 use super::step::StepRecord;
 use crate::gimbal::{ParameterId, ParameterNames, Parameterization};
@@ -227,4 +228,29 @@ fn remedy(
 pub fn flight_advice(step: &StepRecord, rig: &Rig, camera_key: &str) -> Option<Advice> {
     let situation = Situation::of_step(&step.report, step.rank.as_ref()?, rig, camera_key)?;
     advise(&situation)
+}
+
+/// Calibration table of a run after its last step: the same for window, report and files.
+pub fn flight_table(recording: &Recording, run: &RunRecord) -> Vec<FlightParameter> {
+    let verdicts = FlightVerdicts::of_run(run);
+    let improvable = verdicts.verdicts().any(|(_, verdict)| verdict.is_improvable());
+    let ranked = verdicts.ranked_step().filter(|_| improvable);
+    let advice = ranked.and_then(|step| flight_advice(step, &recording.rig, &run.camera_key));
+    verdicts.table(&recording.rig.parameter_names(), advice.as_ref())
+}
+
+/// Number of parameters by verdict: `18 parameters: 13 determined, 5 weakly determined`.
+pub fn flight_headline(rows: &[FlightParameter]) -> String {
+    let counted = Determination::all().filter_map(|verdict| {
+        let count = rows.iter().filter(|row| row.verdict == verdict).count();
+        (count > 0).then(|| format!("{count} {}", verdict.name()))
+    });
+    let noun = if rows.len() == 1 { "parameter" } else { "parameters" };
+    format!("{} {noun}: {}", rows.len(), counted.collect::<Vec<_>>().join(", "))
+}
+
+/// Parameter with the largest ratio of posterior and prior σ among those that another flight could improve.
+pub fn least_determined(rows: &[FlightParameter]) -> Option<&FlightParameter> {
+    let improvable = rows.iter().filter(|row| row.verdict.is_improvable());
+    improvable.max_by(|a, b| a.ratio.unwrap_or(0.0).total_cmp(&b.ratio.unwrap_or(0.0)))
 }

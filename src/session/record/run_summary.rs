@@ -5,7 +5,7 @@ use std::sync::Arc;
 use serde::{Serialize, Serializer};
 
 use super::flight_parameter::FlightParameter;
-use super::flight_table::flight_table;
+use super::flight_verdicts::flight_table;
 use super::losses::{KnownLossSummary, known_losses};
 use super::recording::Recording;
 use super::run::RunRecord;

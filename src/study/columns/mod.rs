@@ -4,9 +4,7 @@
 //! A new column of the table of runs is one entry of [`JobResult::columns`] in `runs.rs`, and its row in `docs/formats.md`,
 //! which a test compares with the tables.
 
-mod frames;
 mod job_result;
-mod parameters;
 mod runs;
 mod tables;
 

@@ -5,8 +5,8 @@
 //! - `filter`: conditions on rows, `ate_rmse_m < 0.1 and run = auto`.
 //! - `arrange`: rows that pass, their order and their groups.
 //! - `metric`: numeric columns with the shown unit.
-//! - `spread`, `success`, `paired`: quantiles, Wilson intervals, differences between groups on equal inputs.
-//! - `summary`: statistics of the groups.
+//! - `spread`, `paired`: quantiles, differences between groups on equal inputs.
+//! - `summary`: statistics and success rates of the groups, with Wilson intervals.
 //! - `parameters`: errors of calibration parameters against their σ.
 //! - `comparable`: the runs that are opened together with a run.
 
@@ -18,7 +18,6 @@ mod paired;
 mod parameters;
 mod spread;
 mod study;
-mod success;
 mod summary;
 #[cfg(test)]
 pub(crate) mod tests;
@@ -31,5 +30,4 @@ pub use paired::{GroupDifference, PairedDifference, paired_differences};
 pub use parameters::{ParameterErrors, ParameterPoint, SigmaVerdict, parameter_errors};
 pub use spread::Spread;
 pub use study::{Study, columns};
-pub use success::{SuccessRate, success_rate};
-pub use summary::{GroupSummary, summarize_groups};
+pub use summary::{GroupSummary, SuccessRate, success_rate, summarize_groups};

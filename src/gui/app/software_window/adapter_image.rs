@@ -9,9 +9,8 @@ use eframe::egui_wgpu::{CallbackResources, CallbackTrait, ScreenDescriptor};
 use egui::{ColorImage, PaintCallbackInfo};
 use parking_lot::Mutex;
 
-use super::unsent_parts::UnsentParts;
 use crate::gui::rendering::image_copy::ImageCopy;
-use crate::gui::rendering::painter::PixelRect;
+use crate::gui::rendering::painter::{Painter, PixelRect};
 
 /// Sends the changed parts to the adapter and shows the image.
 pub(super) struct CopyCallback {
@@ -89,5 +88,36 @@ impl AdapterImage {
             wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(4 * width), rows_per_image: Some(height) },
             wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
         );
+    }
+}
+
+/// Changed parts in the order of painting. A frame that is not shown leaves them to the next one.
+#[derive(Default)]
+pub(super) struct UnsentParts {
+    size_px: [u32; 2],
+    parts: Vec<(PixelRect, ColorImage)>,
+}
+
+impl UnsentParts {
+    /// Adds what the last update of a painter changed; all of it when the size is new, or when less is not fewer pixels.
+    pub(super) fn add(&mut self, painter: &Painter, size_px: [u32; 2]) {
+        let whole = size_px.map(|side| side as usize);
+        if self.size_px == size_px {
+            self.parts.extend(painter.changes());
+            let pixels: usize = self.parts.iter().map(|(_, colors)| colors.pixels.len()).sum();
+            if pixels <= whole[0] * whole[1] {
+                return;
+            }
+        }
+        self.size_px = size_px;
+        self.parts = vec![(PixelRect { at: [0; 2], size: whole }, painter.whole())];
+    }
+
+    pub(super) fn size_px(&self) -> [u32; 2] {
+        self.size_px
+    }
+
+    pub(super) fn take(&mut self) -> Vec<(PixelRect, ColorImage)> {
+        std::mem::take(&mut self.parts)
     }
 }

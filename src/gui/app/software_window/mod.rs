@@ -4,7 +4,6 @@
 //! therefore painted here, and the adapter copies one image.
 
 mod adapter_image;
-mod unsent_parts;
 
 use std::sync::Arc;
 
@@ -15,8 +14,7 @@ use parking_lot::Mutex;
 
 use crate::gui::rendering::chunks::Tessellation;
 use crate::gui::rendering::painter::Painter;
-use adapter_image::CopyCallback;
-use unsent_parts::UnsentParts;
+use adapter_image::{CopyCallback, UnsentParts};
 
 /// Replaces the meshes of a frame by the copy of an image.
 pub(super) struct SoftwareWindow {
