@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use super::frame_sets::FrameSet;
 use super::state::{AnchoredLandmark, Camera, ViewId};
-use super::visual::{BundleObservation, BundleTrack, PixelModel};
+use super::visual::{BundleTrack, PixelModel};
 use super::{CalibrationInput, CalibrationOptions};
-use crate::frontend::{FeatureId, TrackedFrame};
+use crate::frontend::{FeatureId, ObservedPixel, TrackedFrame};
 use crate::optimization::{CameraPose, Ray};
 
 /// Tracked features of a camera in a frame set.
@@ -35,17 +35,13 @@ pub(super) fn collect(
     for (index, frame_set) in frame_sets.iter().enumerate() {
         let Some(frame) = tracked(input, frame_set, camera).filter(|_| wanted(index)) else { continue };
         for feature in &frame.features {
-            let finite = feature.bearing.iter().chain(&feature.uv_px).all(|value| value.is_finite());
-            if !finite {
-                continue;
-            }
+            let Some(observation) = feature.seen_in(ViewId::new(index, camera)) else { continue };
             let track = open.entry(feature.id).or_default();
             let begin = track.observations.first().map_or(index, |first| first.view.frame_set());
             if index - begin >= options.max_frame_sets_per_track {
                 finished.push(std::mem::take(track));
             }
-            let view = ViewId::new(index, camera);
-            track.observations.push(BundleObservation { view, uv_px: feature.uv_px, bearing: feature.bearing });
+            track.observations.push(observation);
         }
     }
     finished.extend(open.into_values());
@@ -63,7 +59,7 @@ pub(super) fn triangulated(
     tracks
         .into_iter()
         .filter_map(|track| {
-            let ray = |observation: &BundleObservation| {
+            let ray = |observation: &ObservedPixel<ViewId>| {
                 let pose = poses.get(&observation.view)?;
                 Some(Ray { centre: pose.position_m, direction: pose.rotation * observation.bearing })
             };

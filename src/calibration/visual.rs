@@ -2,28 +2,20 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{Vector2, Vector3};
+use nalgebra::Vector2;
 use rayon::prelude::*;
 
 use super::state::{AnchoredLandmark, ViewId};
 use crate::camera::CameraModel;
+use crate::frontend::ObservedPixel;
 use crate::optimization::{
     CameraPose, ReducedEquations, RelativePose, ReprojectionEquations, RobustLoss, SparsePoseEquations, reprojection,
 };
 
-/// Observation of a landmark in one view.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct BundleObservation {
-    pub(super) view: ViewId,
-    pub(super) uv_px: Vector2<f64>,
-    /// Unit bearing in the camera.
-    pub(super) bearing: Vector3<f64>,
-}
-
 /// Observations of one landmark, by ascending view.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct BundleTrack {
-    pub(super) observations: Vec<BundleObservation>,
+    pub(super) observations: Vec<ObservedPixel<ViewId>>,
 }
 
 /// Pixel noise and camera models, indexed by [`super::state::Camera`].
@@ -45,7 +37,7 @@ impl PixelModel<'_> {
         &self,
         poses: &BTreeMap<ViewId, CameraPose>,
         anchored: &AnchoredLandmark,
-        observation: &BundleObservation,
+        observation: &ObservedPixel<ViewId>,
     ) -> Option<Vector2<f64>> {
         let camera = self.cameras[Self::camera_index(observation.view)];
         let relative = RelativePose::new(&anchored.anchor, poses.get(&observation.view)?);
@@ -60,7 +52,7 @@ impl PixelModel<'_> {
         landmarks: &[AnchoredLandmark],
     ) -> f64 {
         let costs = tracks.par_iter().zip(landmarks).map(|(track, landmark)| {
-            let cost = |observation: &BundleObservation| {
+            let cost = |observation: &ObservedPixel<ViewId>| {
                 let sigma = self.sigma_px[Self::camera_index(observation.view)];
                 self.loss.cost_of(self.residual_px(poses, landmark, observation), sigma)
             };
@@ -85,7 +77,7 @@ pub(super) fn equations(
 ) -> VisualEquations {
     let mut equations = ReprojectionEquations::new(SparsePoseEquations::new(), tracks.len());
     let terms_of = |(track, anchored): (&BundleTrack, &AnchoredLandmark)| {
-        let term = |observation: &BundleObservation| {
+        let term = |observation: &ObservedPixel<ViewId>| {
             let relative = RelativePose::new(&anchored.anchor, poses.get(&observation.view)?);
             let camera_index = PixelModel::camera_index(observation.view);
             let camera = model.cameras[camera_index];

@@ -33,4 +33,5 @@ pub use prediction::{
 };
 pub use pyramid::Pyramid;
 pub use reference::ReferenceOptions;
+pub(crate) use tracks::ObservedPixel;
 pub use tracks::{FeatureId, FrontEndStatistics, TrackedFeature, TrackedFrame};

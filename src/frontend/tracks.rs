@@ -33,6 +33,24 @@ pub struct TrackedFeature {
     pub bearing: Vector3<f64>,
 }
 
+impl TrackedFeature {
+    /// Observation in a view; `None` unless pixel and bearing are finite.
+    pub(crate) fn seen_in<View>(&self, view: View) -> Option<ObservedPixel<View>> {
+        let Self { uv_px, bearing, .. } = *self;
+        let is_finite = bearing.iter().chain(&uv_px).all(|value| value.is_finite());
+        is_finite.then_some(ObservedPixel { view, uv_px, bearing })
+    }
+}
+
+/// Observation of a landmark in a view: the slot of a frame, or the frame set and camera of an offline calibration.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct ObservedPixel<View> {
+    pub(crate) view: View,
+    pub(crate) uv_px: Vector2<f64>,
+    /// Measured unit bearing in the camera.
+    pub(crate) bearing: Vector3<f64>,
+}
+
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FrontEndStatistics {
     /// Features tracked from the previous image and kept.

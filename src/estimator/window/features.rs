@@ -2,33 +2,22 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{Vector2, Vector3};
-
 use crate::estimator::config::EstimatorOptions;
-use crate::estimator::state::camera_view::CameraView;
-use crate::estimator::state::camera_view::{Track, TrackObservation};
-use crate::frontend::{FeatureId, TrackedFeature};
+use crate::estimator::state::camera_view::{CameraView, Track, TrackObservation};
+use crate::frontend::{FeatureId, ObservedPixel, TrackedFeature};
 use crate::optimization::{self, CameraPose, Landmark, LandmarkModel, Ray, TriangulationOptions};
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct FeatureObservation {
-    pub(crate) slot: usize,
-    pub(crate) uv_px: Vector2<f64>,
-    /// Measured unit bearing in the camera.
-    pub(crate) bearing: Vector3<f64>,
-}
 
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Feature {
     /// By ascending slot; the first observation is the anchor's.
-    pub(crate) observations: Vec<FeatureObservation>,
+    pub(crate) observations: Vec<ObservedPixel<usize>>,
     /// Landmark in the anchor's camera, `None` until triangulated.
     pub(crate) landmark: Option<Landmark>,
 }
 
 impl Feature {
-    pub(crate) fn observation(&self, slot: usize) -> Option<&FeatureObservation> {
-        self.observations.iter().find(|observation| observation.slot == slot)
+    pub(crate) fn observation(&self, slot: usize) -> Option<&ObservedPixel<usize>> {
+        self.observations.iter().find(|observation| observation.view == slot)
     }
 }
 
@@ -37,12 +26,9 @@ pub(crate) type FeatureMap = BTreeMap<FeatureId, Feature>;
 /// Adds the features observed in a frame to the features of the camera; skips non-finite ones.
 pub(crate) fn observe(features: &mut FeatureMap, slot: usize, seen: &[TrackedFeature]) {
     for tracked in seen {
-        let finite = tracked.bearing.iter().chain(tracked.uv_px.iter()).all(|x| x.is_finite());
-        if !finite {
-            continue;
+        if let Some(observation) = tracked.seen_in(slot) {
+            features.entry(tracked.id).or_default().observations.push(observation);
         }
-        let feature = features.entry(tracked.id).or_default();
-        feature.observations.push(FeatureObservation { slot, uv_px: tracked.uv_px, bearing: tracked.bearing });
     }
 }
 
@@ -50,17 +36,17 @@ pub(crate) fn observe(features: &mut FeatureMap, slot: usize, seen: &[TrackedFea
 /// the next observing frame. `view` has the poses before the removal.
 pub(crate) fn drop_frame(features: &mut FeatureMap, gone: usize, view: &CameraView<'_>) {
     for feature in features.values_mut() {
-        let anchor = feature.observations.first().filter(|first| first.slot == gone).map(|first| first.uv_px);
-        feature.observations.retain(|observation| observation.slot != gone);
+        let anchor = feature.observations.first().filter(|first| first.view == gone).map(|first| first.uv_px);
+        feature.observations.retain(|observation| observation.view != gone);
         if let Some(uv_px) = anchor {
             feature.landmark = feature.observations.first().and_then(|next| {
-                let (from, to) = (view.pose(gone, &uv_px), view.pose(next.slot, &next.uv_px));
+                let (from, to) = (view.pose(gone, &uv_px), view.pose(next.view, &next.uv_px));
                 moved(feature.landmark.as_ref()?, &from, &to)
             });
         }
         for observation in &mut feature.observations {
-            if observation.slot > gone {
-                observation.slot -= 1;
+            if observation.view > gone {
+                observation.view -= 1;
             }
         }
     }
@@ -89,15 +75,15 @@ pub(crate) fn triangulate(feature: &Feature, view: &CameraView<'_>, options: &Es
     if feature.observations.len() < options.min_observations {
         return None;
     }
-    let ray = |observation: &FeatureObservation| {
-        let pose = view.pose(observation.slot, &observation.uv_px);
+    let ray = |observation: &ObservedPixel<usize>| {
+        let pose = view.pose(observation.view, &observation.uv_px);
         let direction = pose.rotation * view.bearing(&observation.uv_px, &observation.bearing);
         Ray { centre: pose.position_m, direction }
     };
     let rays: Vec<Ray> = feature.observations.iter().map(ray).collect();
     let limits = TriangulationOptions::of_anchored(options.min_triangulation_angle_rad);
     let point = optimization::triangulate(&rays, &limits)?;
-    let camera = view.pose(anchor.slot, &anchor.uv_px);
+    let camera = view.pose(anchor.view, &anchor.uv_px);
     let in_anchor = camera.rotation.transpose() * (point - camera.position_m);
     let distance = in_anchor.norm();
     let (nearest, farthest) = options.distance_range_m;
@@ -117,8 +103,8 @@ pub(crate) fn compensated_parallax(
     from: usize,
     to: usize,
 ) -> (f64, usize) {
-    let in_world = |observation: &FeatureObservation| {
-        view.pose(observation.slot, &observation.uv_px).rotation
+    let in_world = |observation: &ObservedPixel<usize>| {
+        view.pose(observation.view, &observation.uv_px).rotation
             * view.bearing(&observation.uv_px, &observation.bearing)
     };
     let to_from_from = view.first_row(to).rotation.transpose() * view.first_row(from).rotation;
@@ -155,10 +141,8 @@ impl ActiveTracks {
             if feature.observations.len() < 2 {
                 continue;
             }
-            let track_observation = |observation: &FeatureObservation| TrackObservation {
-                slot: observation.slot,
-                uv_px: observation.uv_px,
-            };
+            let track_observation =
+                |seen: &ObservedPixel<usize>| TrackObservation { slot: seen.view, uv_px: seen.uv_px };
             active.ids.push(*id);
             active.tracks.push(Track { observations: feature.observations.iter().map(track_observation).collect() });
             active.landmarks.push(landmark);

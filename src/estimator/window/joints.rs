@@ -82,11 +82,11 @@ impl WindowState {
             else {
                 continue;
             };
-            if anchor.slot == slot {
+            if anchor.view == slot {
                 continue;
             }
             let camera = if sensor.rolling { camera_at(view.row_fraction(&seen.uv_px)) } else { first_row };
-            let relative = RelativePose::new(&view.pose(anchor.slot, &anchor.uv_px), &camera);
+            let relative = RelativePose::new(&view.pose(anchor.view, &anchor.uv_px), &camera);
             let Some(term) = reprojection::linearize(view.model(), &relative, &relative, landmark, &seen.uv_px) else {
                 continue;
             };

@@ -11,12 +11,12 @@ use crate::estimator::state::imu_errors::ImuErrors;
 use crate::estimator::state::navigation::ImuBias;
 use crate::estimator::state::preintegration::Preintegration;
 use crate::estimator::step_input::StepMeasurements;
-use crate::estimator::window::features::{Feature, FeatureMap, FeatureObservation};
+use crate::estimator::window::features::{Feature, FeatureMap};
 use crate::estimator::window::frames::Frames;
 use crate::estimator::window::loss_scale::LossScale;
 use crate::estimator::window::sliding_window::{Monitors, SlidingWindow};
 use crate::estimator::window::window_state::WindowState;
-use crate::frontend::FeatureId;
+use crate::frontend::{FeatureId, ObservedPixel};
 use crate::optimization::Landmark;
 use crate::sensors::{ImuNoise, ImuSample, JointAngles};
 
@@ -237,7 +237,7 @@ struct PackedFeatures {
     /// Twice the slot of each observation, plus one if it is copied.
     observations: Vec<u16>,
     /// Copied observations: those missing in the step of their frame.
-    own: Vec<FeatureObservation>,
+    own: Vec<ObservedPixel<usize>>,
 }
 
 #[derive(Clone, Debug)]
@@ -258,8 +258,8 @@ impl PackedFeatures {
         };
         for (id, feature) in features {
             for observation in &feature.observations {
-                let copied = observation_of(steps, observation.slot, camera, *id) != Some(*observation);
-                packed.observations.push(2 * observation.slot as u16 + u16::from(copied));
+                let copied = observation_of(steps, observation.view, camera, *id) != Some(*observation);
+                packed.observations.push(2 * observation.view as u16 + u16::from(copied));
                 packed.own.extend(copied.then_some(*observation));
             }
             let count = feature.observations.len() as u32;
@@ -285,7 +285,7 @@ impl PackedFeatures {
         size_of::<Self>()
             + self.features.capacity() * size_of::<PackedFeature>()
             + self.observations.capacity() * size_of::<u16>()
-            + self.own.capacity() * size_of::<FeatureObservation>()
+            + self.own.capacity() * size_of::<ObservedPixel<usize>>()
     }
 }
 
@@ -295,11 +295,10 @@ fn observation_of(
     slot: usize,
     camera: usize,
     id: FeatureId,
-) -> Option<FeatureObservation> {
+) -> Option<ObservedPixel<usize>> {
     let features = (*steps.get(slot)?)?.features(camera);
     let place = features.binary_search_by_key(&id, |feature| feature.id).ok()?;
-    let feature = &features[place];
-    Some(FeatureObservation { slot, uv_px: feature.uv_px, bearing: feature.bearing })
+    features[place].seen_in(slot)
 }
 
 /// [`Prior`] that stores of each column of the Jacobian only the entries down to the last nonzero one: the Jacobian is
