@@ -120,15 +120,27 @@ impl Fault {
         so3::exp(&Vector3::from_fn(|axis, _| self.value(axis)))
     }
 
-    /// True if the fault is larger than the faults of sound sensors and rigs, [`Row::noticeable`](super::Row).
-    pub fn is_noticeable(&self) -> bool {
-        let size = match self.kind {
-            FaultKind::GyroscopeScale | FaultKind::JointScale => self.value(0) - 1.0,
+    /// Size of the fault, zero without one: in the unit of its value, relative for a factor, radians for a mount.
+    fn size(&self) -> f64 {
+        match self.kind {
             FaultKind::CameraDrift => self.value(1),
             FaultKind::Mount => self.mount().angle(),
-            _ => self.value(0),
-        };
-        self.kind.row().noticeable.is_none_or(|noticeable| size.abs() > noticeable)
+            FaultKind::PrincipalPoint | FaultKind::Intrinsics => {
+                let lens = self.lens();
+                (lens.focal - 1.0).abs().max(lens.centre[0].hypot(lens.centre[1]))
+            }
+            kind => self.value(0) - kind.row().change(0).neutral(),
+        }
+    }
+
+    /// True if the fault is larger than the faults of sound sensors and rigs, [`Row::noticeable`](super::Row).
+    pub fn is_noticeable(&self) -> bool {
+        self.kind.row().noticeable.is_none_or(|noticeable| self.size().abs() > noticeable)
+    }
+
+    /// True if the fault makes results useless, [`Row::useless`](super::Row).
+    pub fn is_useless(&self) -> bool {
+        self.kind.row().useless.is_some_and(|useless| self.size().abs() >= useless)
     }
 
     /// True if this fault has the other one as a special case, or differs from it in values only.

@@ -36,9 +36,9 @@ impl JointUnit {
         }
     }
 
-    /// Unit of this size.
+    /// Unit of this size, up to 1 %.
     pub fn of_size(size_rad: f64) -> Option<Self> {
-        Self::all().find(|unit| (unit.size_rad() / size_rad - 1.0).abs() < 1e-6)
+        Self::all().find(|unit| (unit.size_rad() / size_rad - 1.0).abs() < 0.01)
     }
 
     /// State of angles in this unit.

@@ -21,5 +21,5 @@ pub use apply::{JointMap, LensChange, correct_joint_angles, joint_maps};
 pub use fault::{Choice, Fault, ImageFlip, ImageHalf};
 pub use joint_unit::JointUnit;
 pub use ranking::{Explanation, MOST_REMAINING, criterion};
-pub use sentence::{Sentence, Severity, Subject, USELESS_DELAY_S};
+pub use sentence::{Sentence, Severity, Subject};
 pub use table::{Area, Change, Correction, FaultKind, LONGEST_SHIFT_S, Parameter, Part, Row, Sensor, TABLE};

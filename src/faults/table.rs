@@ -114,6 +114,8 @@ pub struct Row {
     pub trials: &'static [f64],
     /// Largest size that sound sensors and rigs have; `None` if any size is a fault.
     pub noticeable: Option<f64>,
+    /// Smallest size that makes results useless; `None` if any size only degrades them.
+    pub useless: Option<f64>,
     /// Kinds that contain this one as a special case.
     pub general: &'static [FaultKind],
 }
@@ -169,6 +171,12 @@ pub enum Change {
 /// Longest shift of a clock, in seconds: samples of that time around an image are at hand.
 pub const LONGEST_SHIFT_S: f64 = 0.05;
 
+/// Relative errors of intrinsics and scales from which on results are useless.
+pub(super) const USELESS_RATIO: f64 = 0.05;
+/// Error of the zero of a joint from which on results are useless, in radians, and the same of a camera's orientation.
+const USELESS_OFFSET_RAD: f64 = 10.0 * DEGREE;
+const USELESS_ROTATION_RAD: f64 = 3.0 * DEGREE;
+
 /// Tried shifts of clocks in seconds, beside those that the columns of time offsets find.
 const SHIFTS_S: &[f64] = &[-0.04, -0.02, 0.02, 0.04];
 const DEGREE: f64 = PI / 180.0;
@@ -189,15 +197,15 @@ pub const TABLE: &[Row] = &[
         .corrected("focal", &[Part::Factor], "FACTOR")
         .fitted(&[FOCAL], &[])
         .tried(&[0.5, 0.6, 0.7, 0.78, 0.87, 0.95, 1.05, 1.15, 1.3, 1.5, 1.8])
-        .within(&[FaultKind::Intrinsics, FaultKind::FocalPieces]),
+        .within(&[FaultKind::Intrinsics, FaultKind::FocalPieces])
+        .useless(USELESS_RATIO),
     Row::new(FaultKind::Zoom, "zoom", Sensor::Camera, Area::Intrinsics)
         .corrected("zoom", &[Part::Factor, Part::Duration], "FACTOR:1s")
-        .tried(&[0.6, 0.78, 1.28, 1.6]),
-    Row::new(FaultKind::ImageFlip, "image_flip", Sensor::Camera, Area::Images).corrected(
-        "image",
-        &[Part::Flip],
-        "mirrored|flipped|upside-down",
-    ),
+        .tried(&[0.6, 0.78, 1.28, 1.6])
+        .useless(0.0),
+    Row::new(FaultKind::ImageFlip, "image_flip", Sensor::Camera, Area::Images)
+        .corrected("image", &[Part::Flip], "mirrored|flipped|upside-down")
+        .useless(0.0),
     Row::new(FaultKind::ImageRegion, "image_region", Sensor::Camera, Area::Images).corrected(
         "ignored",
         &[Part::Half],
@@ -207,68 +215,80 @@ pub const TABLE: &[Row] = &[
         .corrected("camera-shift", &[Part::Shift], "15ms")
         .fitted(&[SHIFT], &[])
         .tried(SHIFTS_S)
-        .within(&[FaultKind::Clocks]),
+        .within(&[FaultKind::Clocks])
+        .useless(LONGEST_SHIFT_S),
     Row::new(FaultKind::EncoderClock, "encoder_clock", Sensor::Joints, Area::Time)
         .corrected("joint-shift", &[Part::Shift], "15ms")
         .fitted(&[JOINT_SHIFT], &[0.1, 0.0, -0.1, -0.2, -0.35])
         .noticeable(0.02)
         .tried(SHIFTS_S)
-        .within(&[FaultKind::Clocks, FaultKind::EncoderNoise]),
+        .within(&[FaultKind::Clocks, FaultKind::EncoderNoise])
+        .useless(LONGEST_SHIFT_S),
     Row::new(FaultKind::JointReversed, "joint_reversed", Sensor::Joints, Area::Encoders)
         .corrected("reversed", &[Part::Joint], "JOINT")
         .fitted(&[OFFSET], &[])
-        .within(&[FaultKind::EncoderNoise]),
+        .within(&[FaultKind::EncoderNoise])
+        .useless(0.0),
     Row::new(FaultKind::JointsSwapped, "joints_swapped", Sensor::Joints, Area::Encoders)
         .corrected("swapped", &[Part::Joint, Part::Joint], "JOINT:JOINT")
-        .within(&[FaultKind::EncoderNoise]),
+        .within(&[FaultKind::EncoderNoise])
+        .useless(0.0),
     Row::new(FaultKind::JointOffset, "joint_offset", Sensor::Joints, Area::Encoders)
         .corrected("offset", &[Part::Joint, Part::Angle], "JOINT:20deg")
         .fitted(&[OFFSET], &[0.0, 0.6, -0.6, FRAC_PI_2, -FRAC_PI_2])
         .noticeable(0.026)
-        .within(&[FaultKind::EncoderNoise, FaultKind::Chain]),
+        .within(&[FaultKind::EncoderNoise, FaultKind::Chain])
+        .useless(USELESS_OFFSET_RAD),
     Row::new(FaultKind::JointScale, "joint_scale", Sensor::Joints, Area::Encoders)
         .corrected("joint-scale", &[Part::Factor], "FACTOR")
         .fitted(&[SCALE], &[1.0])
         .noticeable(0.03)
         .tried(&[DEGREE, 1.0 / DEGREE])
-        .within(&[FaultKind::EncoderNoise]),
-    Row::new(FaultKind::ImuAxes, "imu_axes", Sensor::Imu, Area::Imu).corrected("imu-axes", &[Part::Axes], "y/x/-z"),
-    Row::new(FaultKind::GyroscopeAxes, "gyroscope_axes", Sensor::Imu, Area::Imu).corrected(
-        "gyroscope-axes",
-        &[Part::Axes],
-        "…",
-    ),
-    Row::new(FaultKind::AccelerometerAxes, "accelerometer_axes", Sensor::Imu, Area::Imu).corrected(
-        "accelerometer-axes",
-        &[Part::Axes],
-        "…",
-    ),
+        .within(&[FaultKind::EncoderNoise])
+        .useless(USELESS_RATIO),
+    Row::new(FaultKind::ImuAxes, "imu_axes", Sensor::Imu, Area::Imu)
+        .corrected("imu-axes", &[Part::Axes], "y/x/-z")
+        .useless(0.0),
+    Row::new(FaultKind::GyroscopeAxes, "gyroscope_axes", Sensor::Imu, Area::Imu)
+        .corrected("gyroscope-axes", &[Part::Axes], "…")
+        .useless(0.0),
+    Row::new(FaultKind::AccelerometerAxes, "accelerometer_axes", Sensor::Imu, Area::Imu)
+        .corrected("accelerometer-axes", &[Part::Axes], "…")
+        .useless(0.0),
     // Wrong units and ranges: degrees and radians, g and m/s², half and double the range.
     Row::new(FaultKind::GyroscopeScale, "gyroscope_scale", Sensor::Imu, Area::Imu)
         .corrected("gyroscope-scale", &[Part::Factor], "FACTOR")
         .fitted(&[SCALE], &[1.0, 2.0, 0.5, DEGREE])
         .noticeable(0.03)
-        .tried(&[DEGREE, 1.0 / DEGREE, 2.0, 0.5]),
+        .tried(&[DEGREE, 1.0 / DEGREE, 2.0, 0.5])
+        .useless(USELESS_RATIO),
     Row::new(FaultKind::AccelerometerScale, "accelerometer_scale", Sensor::Imu, Area::Imu)
         .corrected("accelerometer-scale", &[Part::Factor], "FACTOR")
-        .tried(&[9.806_65, 1.0 / 9.806_65, 2.0, 0.5]),
+        .tried(&[9.806_65, 1.0 / 9.806_65, 2.0, 0.5])
+        .useless(USELESS_RATIO),
     Row::new(FaultKind::Clocks, "clocks", Sensor::Camera, Area::Time),
     Row::new(FaultKind::Shutter, "shutter", Sensor::Camera, Area::Time),
     Row::new(FaultKind::PrincipalPoint, "principal_point", Sensor::Camera, Area::Intrinsics)
         .fitted(&[CENTRE], &[0.0])
-        .within(&[FaultKind::Intrinsics]),
-    Row::new(FaultKind::Intrinsics, "intrinsics", Sensor::Camera, Area::Intrinsics).fitted(&[FOCAL, CENTRE], &[]),
-    Row::new(FaultKind::FocalPieces, "focal_pieces", Sensor::Camera, Area::Intrinsics),
+        .within(&[FaultKind::Intrinsics])
+        .useless(USELESS_RATIO),
+    Row::new(FaultKind::Intrinsics, "intrinsics", Sensor::Camera, Area::Intrinsics)
+        .fitted(&[FOCAL, CENTRE], &[])
+        .useless(USELESS_RATIO),
+    Row::new(FaultKind::FocalPieces, "focal_pieces", Sensor::Camera, Area::Intrinsics).useless(0.0),
     Row::new(FaultKind::CameraDrift, "camera_drift", Sensor::Camera, Area::Time)
         .fitted(&[SHIFT, DRIFT], &[0.0])
         .noticeable(2e-4),
-    Row::new(FaultKind::Mount, "mount", Sensor::Camera, Area::Extrinsics).fitted(&[ROTATION], &[0.0]).noticeable(0.026),
+    Row::new(FaultKind::Mount, "mount", Sensor::Camera, Area::Extrinsics)
+        .fitted(&[ROTATION], &[0.0])
+        .noticeable(0.026)
+        .useless(USELESS_ROTATION_RAD),
     Row::new(FaultKind::Chain, "extrinsics", Sensor::Camera, Area::Extrinsics).within(&[FaultKind::EncoderNoise]),
     Row::new(FaultKind::ImuIntrinsics, "imu_intrinsics", Sensor::Imu, Area::Imu),
     Row::new(FaultKind::ImuNoise, "imu_noise", Sensor::Imu, Area::Imu).tried(NOISE_FACTORS),
     Row::new(FaultKind::EncoderNoise, "encoder_noise", Sensor::Joints, Area::Encoders).tried(NOISE_FACTORS),
-    Row::new(FaultKind::UnusableImu, "unusable_imu", Sensor::Imu, Area::Imu),
-    Row::new(FaultKind::UnusableJoints, "unusable_joints", Sensor::Joints, Area::Encoders),
+    Row::new(FaultKind::UnusableImu, "unusable_imu", Sensor::Imu, Area::Imu).useless(0.0),
+    Row::new(FaultKind::UnusableJoints, "unusable_joints", Sensor::Joints, Area::Encoders).useless(0.0),
 ];
 
 const NOISE_FACTORS: &[f64] = &[3.0, 10.0, 30.0];
@@ -285,6 +305,7 @@ impl Row {
             starts: &[],
             trials: &[],
             noticeable: None,
+            useless: None,
             general: &[],
         }
     }
@@ -299,6 +320,10 @@ impl Row {
 
     const fn noticeable(self, size: f64) -> Self {
         Self { noticeable: Some(size), ..self }
+    }
+
+    const fn useless(self, size: f64) -> Self {
+        Self { useless: Some(size), ..self }
     }
 
     const fn tried(self, trials: &'static [f64]) -> Self {

@@ -58,11 +58,13 @@ fn expect<'a>(report: &'a CheckReport, severity: Severity, title: &str) -> &'a F
     found[0]
 }
 
-/// Milliseconds in a title such as `time offset of cam1 to the gyroscope: +30 ms`.
+/// Time offset to be added to the rig's in milliseconds, from a title such as `the stamps of cam1 are 30.0 ms earlier than
+/// the rig says`.
 fn time_offset_ms(report: &CheckReport, camera: &str) -> i32 {
-    let finding = expect(report, Severity::Warning, &format!("time offset of {camera} to the gyroscope"));
-    let number = finding.title.split_whitespace().find_map(|word| word.parse().ok());
-    number.expect("the title names the milliseconds")
+    let finding = expect(report, Severity::Warning, &format!("the stamps of {camera} are "));
+    let number: Option<f64> = finding.title.split_whitespace().find_map(|word| word.parse().ok());
+    let sign = if finding.title.contains(" earlier ") { 1.0 } else { -1.0 };
+    (sign * number.expect("the title names the milliseconds")).round() as i32
 }
 
 #[test]
@@ -76,7 +78,7 @@ fn rotations_of_the_sample_log_detect_a_wrong_rig() {
     expect(&correct, Severity::Good, &format!("the orientation of {camera} agrees with the rig"));
     expect(&correct, Severity::Good, &format!("{camera} and the gyroscope are synchronized"));
     assert!(correct.worst() < Severity::Error, "{correct}");
-    assert!(!correct.findings.iter().any(|finding| finding.title.contains("to the gyroscope:")), "{correct}");
+    assert!(!correct.findings.iter().any(|finding| finding.title.contains("than the rig says")), "{correct}");
 
     // Noise of the encoders is no time offset, and the misfit of both cameras is what noise predicts.
     let gimbal = sample.gimbal_camera();

@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use crate::faults::{Fault, FaultKind, USELESS_DELAY_S};
+use crate::faults::{Fault, FaultKind, Sentence, Subject};
 use crate::geometry::{best_rotation, so3};
 use crate::gimbal::ClassicalChain;
 use crate::log_check::clock_alignment::{
@@ -171,11 +171,11 @@ impl HandEye<'_> {
         if offset_s.abs() < OFFSET_TOLERANCE_S.max(sigmas * sigma_s) {
             findings.good(Area::Time, format!("{key} and the gyroscope are synchronized"), evidence);
         } else if is_explained {
-            let title = format!("time offset of {key} to the gyroscope: {:+.0} ms", offset_s * 1e3);
-            let remedy = format!("set {key}.timeshift_cam_imu to {:+.3}", given_s + offset_s);
-            let severity = if offset_s.abs() > USELESS_DELAY_S { Severity::Error } else { Severity::Warning };
-            findings.add(severity, Area::Time, title, evidence, remedy);
-            findings.state_faults([Fault::new(FaultKind::CameraClock, &[offset_s]).of_camera(key)]);
+            let fault = Fault::new(FaultKind::CameraClock, &[offset_s]).of_camera(key);
+            let subject = Subject { rig: self.data.rig, camera_key: key };
+            let Sentence { severity, statement, remedy } = subject.sentence(&fault);
+            findings.add(severity, Area::Time, statement, evidence, remedy);
+            findings.state_faults([fault]);
         } else {
             let title = format!("no time offset of {key} explains its rotations");
             findings.add(Severity::Note, Area::Time, title, evidence, "see the finding on its orientation");

@@ -37,7 +37,7 @@ pub(super) fn check_rotations(
         check_against_gravity(survey, rig, camera, imu_facts, findings);
         check_lever(camera, findings);
         let mut of_readout = Findings::default();
-        let readout_s = check_readout(camera, imu_facts, rotations, &mut of_readout);
+        let readout_s = check_readout(rig, camera, imu_facts, rotations, &mut of_readout);
         match hand_eye::check_against_gyroscope(survey, rig, camera, imu_facts, rotations, readout_s, findings) {
             // By a wrong lens, features move faster in one half of the image, as by a rolling shutter.
             HandEyeOutcome::WrongIntrinsics => continue,

@@ -2,14 +2,14 @@
 
 use nalgebra::Matrix3;
 
-use crate::faults::{Fault, FaultKind};
+use crate::faults::{Fault, FaultKind, Sentence, Subject};
 use crate::frontend::readout::{
     FirstRowRotation, ImagePair, ReadoutMeasurement, ReadoutOptions, measure_readout, rotations_of_first_rows,
 };
 use crate::geometry::{ns_from_seconds, seconds_from_ns};
 use crate::log_check::imu::ImuFacts;
 use crate::log_check::report::{Area, Findings, ImageRotation, Severity};
-use crate::sensors::{AngularRates, CameraMount, CameraRig};
+use crate::sensors::{AngularRates, CameraMount, CameraRig, Rig};
 
 /// A readout is reported if it differs from the rig's by more standard deviations than this.
 const SIGNIFICANT_SIGMAS: f64 = 5.0;
@@ -20,6 +20,7 @@ const USEFUL_SIGMA_S: f64 = 0.003;
 
 /// Checks a camera's readout by the features of consecutive images; returns the readout to be used for its rotations.
 pub(crate) fn check_readout(
+    rig: &Rig,
     camera: &CameraRig,
     imu_facts: &ImuFacts,
     rotations: &[ImageRotation],
@@ -48,14 +49,10 @@ pub(crate) fn check_readout(
     let difference_s = (readout_s - camera.readout_s).abs();
     let difference = difference_s > TOLERANCE_S && difference_s > SIGNIFICANT_SIGMAS * sigma_s;
     if difference {
-        let title = if camera.readout_s == 0.0 {
-            format!("{key} has a rolling shutter: readout {:+.1} ms", readout_s * 1e3)
-        } else {
-            format!("the readout of {key} differs from the rig: {:+.1} ms", readout_s * 1e3)
-        };
-        let remedy = format!("set {key}.readout to {readout_s:.4} and {key}.readout_sigma to {:.4}", sigma_s.max(1e-4));
-        findings.add(Severity::Warning, Area::Time, title, evidence, remedy);
-        findings.state_faults([Fault::from(FaultKind::Shutter).of_camera(key)]);
+        let fault = Fault::new(FaultKind::Shutter, &[readout_s, sigma_s]).of_camera(key);
+        let Sentence { severity, statement, remedy } = Subject { rig, camera_key: key }.sentence(&fault);
+        findings.add(severity, Area::Time, statement, evidence, remedy);
+        findings.state_faults([fault]);
         return readout_s;
     }
     if sigma_s > USEFUL_SIGMA_S {

@@ -82,12 +82,20 @@ fn shifts(run: &DiagnosedRun<'_>, result: &TrialResult) -> Vec<TrialHypothesis> 
 
 /// Factor on the rig's focal length from the columns of the intrinsics and the factor that the trial already has.
 fn focal(run: &DiagnosedRun<'_>, candidate: &RankedTrial) -> Option<f64> {
-    let [fx, fy, ..] = run.rig.camera(run.camera_key).ok()?.model.intrinsics();
-    let column = |quantity| value(&candidate.result, ParameterPart::Camera(0), quantity);
-    let ratio = 0.5 * (column(Quantity::Fx)? / fx + column(Quantity::Fy)? / fy);
-    let known: f64 = candidate.hypothesis.changes.corrections.iter().map(|fault| fault.lens().focal).product();
-    let factor = known * ratio;
+    let [factor, ..] = estimated_lens(run, &candidate.hypothesis.changes, &candidate.result)?;
     ((factor - 1.0).abs() > LEAST_FOCAL && (0.1..10.0).contains(&factor)).then_some(factor)
+}
+
+/// Values of [`FaultKind::Intrinsics`] from the columns of the intrinsics of a trial and the focal lengths that its changes
+/// already correct.
+pub(super) fn estimated_lens(run: &DiagnosedRun<'_>, changes: &ForkChanges, result: &TrialResult) -> Option<[f64; 3]> {
+    let [fx, fy, cx, cy, ..] = run.rig.camera(run.camera_key).ok()?.model.intrinsics();
+    let column = |quantity| value(result, ParameterPart::Camera(0), quantity);
+    let ratio = 0.5 * (column(Quantity::Fx)? / fx + column(Quantity::Fy)? / fy);
+    let known: f64 = changes.corrections.iter().map(|fault| fault.lens().focal).product();
+    // Corrected pixels are those of the rig's camera: their errors are smaller by the factor.
+    let centre = [(column(Quantity::Cx)? - cx) / fx, (column(Quantity::Cy)? - cy) / fy];
+    Some([known * ratio, known * centre[0], known * centre[1]])
 }
 
 /// Constant and stepping offsets of each joint, from the joint angles of a trial that hardly uses the readings.

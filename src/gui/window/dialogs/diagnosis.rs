@@ -107,8 +107,8 @@ mod tests {
         let changes: ForkChanges = "correct=reversed:yaw".parse().unwrap();
         let cause = RankedCause {
             cause: FaultKind::JointReversed,
-            statement: "joint yaw counts in the other direction".to_owned(),
-            remedy: "reverse the sign of yaw in the recording".to_owned(),
+            statement: "joint 'yaw' counts in the other direction than in the rig".to_owned(),
+            remedy: "reverse the sign of the readings of 'yaw' in the driver".to_owned(),
             changes,
             from_ns: 2 * SECOND_NS,
             from_s: 2.0,
@@ -125,9 +125,9 @@ mod tests {
             log_faults: vec![Finding {
                 severity: Severity::Warning,
                 area: Area::Time,
-                title: "joint angles are 81 ms late".to_owned(),
+                title: "the stamps of the joint angles are 81.0 ms later than the rig says".to_owned(),
                 evidence: String::new(),
-                remedy: "set gimbal.timeshift_gimbal_imu to -0.081".to_owned(),
+                remedy: "set gimbal.timeshift_gimbal_imu: -0.0810 in the rig, or run with timeshift=on".to_owned(),
                 is_assumption: false,
                 faults: Vec::new(),
             }],
@@ -161,8 +161,15 @@ mod tests {
         progress.result = Some(Arc::new(diagnosis()));
         harness.state_mut().playback.diagnosis = Some(progress);
         harness.run_steps(3);
-        assert!(harness.query_all_by_label("Joint yaw counts in the other direction").count() > 0);
-        assert!(harness.query_all_by_label("Check of the log, warning: joint angles are 81 ms late").count() > 0);
+        assert!(harness.query_all_by_label("Joint 'yaw' counts in the other direction than in the rig").count() > 0);
+        assert!(
+            harness
+                .query_all_by_label(
+                    "Check of the log, warning: the stamps of the joint angles are 81.0 ms later than the rig says"
+                )
+                .count()
+                > 0
+        );
         let pushed = commands_of(&mut harness, |harness| harness.get_by_label("Fork").click());
         let changes = diagnosis().causes[0].changes.clone();
         let expected = [Command::Seek { stamp_ns: 2 * SECOND_NS }, Command::Fork { run: 0, changes, label: None }];

@@ -110,15 +110,14 @@ pub(in crate::log_check) fn explain_within_noise(
 /// Cause that a fit describes, in words and with its value.
 fn cause(data: &RotationData<'_>, found: &Fitted) -> NamedCause {
     let kind = found.fault.kind;
-    let is_left_handed = kind == FaultKind::GyroscopeAxes;
-    let recorded = if is_left_handed { recorded_axes(data, found) } else { None };
-    let fault = if is_left_handed {
-        recorded.map(|axes| Fault::of_axes(kind, axes))
+    let fault = if kind == FaultKind::GyroscopeAxes {
+        recorded_axes(data, found).map(|axes| Fault::of_axes(kind, axes))
     } else {
         Some(found.fault.clone().of_camera(&data.camera.key))
     };
     let subject = Subject { rig: data.rig, camera_key: &data.camera.key };
-    let sentence = subject.by_rotations(&found.fault, recorded.map(|axes| axes.inverse()));
+    let without_axes = Fault::from(kind);
+    let sentence = subject.sentence(fault.as_ref().unwrap_or(&without_axes));
     NamedCause { area: kind.row().area, sentence, fault }
 }
 
