@@ -28,6 +28,15 @@ pub struct JointMap {
 impl LensChange {
     pub const NONE: Self = Self { focal: 1.0, centre: [0.0; 2] };
 
+    /// Camera with these intrinsics from one with the rig's.
+    pub fn camera(&self, rig: &CameraModel) -> CameraModel {
+        let mut camera = rig.clone();
+        let [fx, fy, cx, cy] = rig.intrinsics_px;
+        let [dx, dy] = self.centre;
+        camera.intrinsics_px = [fx * self.focal, fy * self.focal, cx + dx * fx, cy + dy * fy];
+        camera
+    }
+
     /// Bearing with these intrinsics from one with the rig's.
     pub fn bearing(&self, bearing: &Vector3<f64>) -> Vector3<f64> {
         let [x, y] = [0, 1].map(|axis| (bearing[axis] - self.centre[axis] * bearing.z) / self.focal);
@@ -124,17 +133,27 @@ impl Fault {
         }
     }
 
+    /// Ratio of the true focal length to the rig's, `since_s` seconds after a change began.
+    pub fn focal_factor(&self, since_s: f64) -> f64 {
+        match self.kind {
+            FaultKind::Zoom => {
+                let (factor, over_s) = (self.value(0), self.value(1));
+                let reached = if over_s > 0.0 { (since_s / over_s).clamp(0.0, 1.0) } else { 1.0 };
+                1.0 + (factor - 1.0) * reached
+            }
+            _ => self.lens().focal,
+        }
+    }
+
     /// Pixel at which the rig's camera would see the direction of a pixel, `since_s` seconds after a change began; `None`
     /// if it is not used or outside of the camera's domain.
     pub fn pixel(&self, camera: &CameraModel, uv_px: Vector2<f64>, since_s: f64) -> Option<Vector2<f64>> {
         let [width, height] = camera.resolution_px.map(|size| size as f64);
         let (left, top) = (width - 1.0 - uv_px.x, height - 1.0 - uv_px.y);
         match (self.kind, self.choice) {
-            (FaultKind::Focal, _) => with_focal_factor(camera, self.value(0), &uv_px),
-            (FaultKind::Zoom, _) => {
-                let (factor, over_s) = (self.value(0), self.value(1));
-                let reached = if over_s > 0.0 { (since_s / over_s).clamp(0.0, 1.0) } else { 1.0 };
-                with_focal_factor(camera, 1.0 + (factor - 1.0) * reached, &uv_px)
+            (FaultKind::Focal | FaultKind::Zoom, _) => {
+                let lens = LensChange { focal: self.focal_factor(since_s), ..LensChange::NONE };
+                camera.project(&lens.camera(camera).unproject(&uv_px)?)
             }
             (_, Some(Choice::Flip(ImageFlip::Mirrored))) => Some(Vector2::new(left, uv_px.y)),
             (_, Some(Choice::Flip(ImageFlip::Flipped))) => Some(Vector2::new(uv_px.x, top)),
@@ -169,11 +188,15 @@ impl Fault {
     }
 }
 
-/// Pixel at which the rig's camera sees the direction of a pixel of a camera with other focal lengths.
-fn with_focal_factor(camera: &CameraModel, factor: f64, uv_px: &Vector2<f64>) -> Option<Vector2<f64>> {
-    let [fx, fy, cx, cy, k1, k2] = camera.intrinsics();
-    let corrected = camera.with_intrinsics([fx * factor, fy * factor, cx, cy, k1, k2]).ok()?;
-    camera.project(&corrected.unproject(uv_px)?)
+/// Checks that all joints of faults are among these names.
+///
+/// # Errors
+/// The first joint that is not.
+pub fn check_joints(faults: &[Fault], names: &[String]) -> Result<(), String> {
+    match faults.iter().flat_map(|fault| &fault.joints).find(|joint| !names.contains(joint)) {
+        Some(joint) => Err(format!("the rig has no joint '{joint}'; it has: {}", names.join(", "))),
+        None => Ok(()),
+    }
 }
 
 /// Maps of the readings of joints with these names, after all faults in their order.

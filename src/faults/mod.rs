@@ -17,7 +17,7 @@ mod ranking;
 mod sentence;
 mod table;
 
-pub use apply::{JointMap, LensChange, correct_joint_angles, joint_maps};
+pub use apply::{JointMap, LensChange, check_joints, correct_joint_angles, joint_maps};
 pub use fault::{Choice, Fault, ImageFlip, ImageHalf};
 pub use joint_unit::JointUnit;
 pub use ranking::{Explanation, MOST_REMAINING, criterion};

@@ -4,6 +4,7 @@ use std::ops::RangeInclusive;
 
 use super::error::SimulationError;
 use super::vibration::Vibration;
+use crate::faults::{Fault, FaultKind};
 use crate::geometry::during;
 use crate::sensors::CameraMount;
 use crate::text::{FINITE, Field, Key, Numbers, read_item};
@@ -40,6 +41,8 @@ pub struct Disturbances {
     pub vibration: Option<Vibration>,
     pub gimbal_vibration: Option<Vibration>,
     pub gimbal_imu_error: [f64; 2],
+    /// Faults that the corrections of a fork undo, in the order of these corrections.
+    pub faults: Vec<Fault>,
 }
 
 /// Default ratio by which the farthest corner of an image is darker than the centre.
@@ -237,6 +240,17 @@ impl Disturbances {
             |it| &mut it.gimbal_imu_error,
             &[-1.0..=1.0, 0.0..=0.5],
         ),
+        Key::new(
+            "fault",
+            "CORRECTION[@S]",
+            "the fault that the fork with `correct=CORRECTION` undoes, from a time on if one is given: `reversed:yaw`, \
+             `offset:yaw:20deg@4`, `zoom:1.5:1s@3`, `imu-axes:y/x/-z`; `focal` is an error of the given rig, `camera-shift` \
+             is as `camera-offset`; may be given several times",
+            Field::Other(
+                |it, entry| read_fault(entry.value).map(|fault| it.faults.push(fault)),
+                |it| it.faults.iter().map(written_fault).collect(),
+            ),
+        ),
     ];
 
     /// Adds one disturbance written as `KEY=VALUE[,VALUE…]`.
@@ -279,4 +293,30 @@ impl Disturbances {
         let [start_s, length_s, grey] = blind?;
         during(Some([start_s, length_s]), time_s).then_some(grey as f32)
     }
+}
+
+/// Reads a fault written as its correction, with the time from which on it acts: `offset:yaw:20deg@4`.
+///
+/// # Errors
+/// For an unknown correction, and for a fault that cannot be simulated.
+fn read_fault(text: &str) -> Result<Fault, String> {
+    let (correction, since) = text.split_once('@').map_or((text, None), |(before, since)| (before, Some(since)));
+    let mut fault: Fault = correction.parse()?;
+    if let Some(since) = since {
+        let since_s = since.parse().ok().filter(|since_s: &f64| since_s.is_finite());
+        fault.since_s = Some(since_s.ok_or_else(|| format!("'{since}' is no time in seconds"))?);
+    }
+    match fault.kind {
+        FaultKind::ImageRegion => Err(format!("'{text}' leaves a half out: which images it had is unknown")),
+        FaultKind::Focal | FaultKind::CameraClock if fault.since_s.is_some() => {
+            Err(format!("'{text}': the rig has one value for the whole log, expected no time"))
+        }
+        _ => Ok(fault),
+    }
+}
+
+/// Text of a fault as [`read_fault`] reads it.
+fn written_fault(fault: &Fault) -> String {
+    let since = fault.since_s.map_or_else(String::new, |since_s| format!("@{since_s}"));
+    format!("{fault}{since}")
 }

@@ -190,34 +190,6 @@ pub(crate) fn given_rig(ground_truth: &Rig, bounds: ChainPrior, random: &mut Ran
     given
 }
 
-/// Errors of the intrinsics of a given camera.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct IntrinsicsError {
-    /// Error of both focal lengths, as a ratio: 0.01 makes the given ones 1 % too long.
-    pub focal_ratio: f64,
-    /// Error of the principal point.
-    pub centre_px: [f64; 2],
-    /// Errors of the first two coefficients of the lens, if it has any.
-    pub distortion: [f64; 2],
-}
-
-impl IntrinsicsError {
-    /// Camera model with this error.
-    pub(crate) fn applied(&self, model: &CameraModel) -> CameraModel {
-        let mut wrong = model.clone();
-        let [fx, fy, cx, cy] = &mut wrong.intrinsics_px;
-        *fx *= 1.0 + self.focal_ratio;
-        *fy *= 1.0 + self.focal_ratio;
-        *cx += self.centre_px[0];
-        *cy += self.centre_px[1];
-        if let Distortion::Radtan([k1, k2, ..]) = &mut wrong.distortion {
-            *k1 += self.distortion[0];
-            *k2 += self.distortion[1];
-        }
-        wrong
-    }
-}
-
 /// Random scales and axes of an IMU: normal errors with these standard deviations, limited to twice them. `angle_rad`
 /// applies to misalignments and to the rotation between gyroscope and accelerometer.
 pub(crate) fn random_imu_intrinsics(scale: f64, angle_rad: f64, random: &mut RandomStream) -> ImuIntrinsics {

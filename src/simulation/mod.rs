@@ -22,6 +22,8 @@ mod motion_samples;
 #[cfg(feature = "logs")]
 mod options;
 #[cfg(feature = "logs")]
+mod planting;
+#[cfg(feature = "logs")]
 mod prescribed;
 mod random;
 #[cfg(feature = "logs")]
@@ -44,7 +46,7 @@ mod world;
 
 #[cfg(feature = "logs")]
 pub use disturbances::Disturbances;
-pub use equipment::{IntrinsicsError, Lens};
+pub use equipment::Lens;
 #[cfg(feature = "logs")]
 pub use error::SimulationError;
 pub use exercise::{Exercise, GROWTH_S, JOINT_PERIOD_S, JointSwing, ROCK_PERIOD_S, VehicleSwing};

@@ -5,6 +5,7 @@ use nalgebra::Vector2;
 use super::equipment::{GRAVITY_M_PER_S2, GROUND_TRUTH_TOPIC, JOINT_TOPIC};
 use super::error::SimulationError;
 use super::options::SimulationOptions;
+use super::planting::Planting;
 use crate::camera::CameraModel;
 use crate::sensors::{CameraMount, CameraRig, ChainPrior, GimbalRig, ImuIntrinsics, Rig};
 
@@ -35,7 +36,7 @@ pub(super) fn rig_as_truth(rig: &Rig, options: &SimulationOptions, name: &str) -
         return Err(problem("it has no camera on the gimbal; keep the static ones".to_owned()));
     }
     for camera in &mut truth.cameras {
-        camera.timeshift_cam_imu_s = options.disturbances.camera_time_offset_s;
+        camera.timeshift_cam_imu_s = Planting::of(&options.disturbances).camera_offset_s();
         camera.readout_s = options.disturbances.readout_s;
     }
     if let Some(gimbal) = &mut truth.gimbal {

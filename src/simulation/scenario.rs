@@ -1,10 +1,11 @@
 //! Flight with its rig and the measurements of all sensors except the cameras.
 
-use super::equipment::{GRAVITY_M_PER_S2, IntrinsicsError, given_rig, random_imu_intrinsics};
+use super::equipment::{GRAVITY_M_PER_S2, given_rig, random_imu_intrinsics};
 use super::gimbal::JointMotion;
 use super::imu::ImuRecord;
 use super::random::RandomStream;
 use super::trajectory::Trajectory;
+use crate::faults::LensChange;
 use crate::geometry::{RigidTransform, ns_from_seconds, seconds_from_ns};
 use crate::sensors::{CameraMount, CameraRig, ChainPrior, GimbalRig, JointSample, Rig};
 
@@ -85,9 +86,9 @@ impl Scenario {
     }
 
     /// Applies errors to the intrinsics of all cameras of the given rig.
-    pub(crate) fn spoil_intrinsics(&mut self, error: &IntrinsicsError) {
-        for (given, actual) in self.given_rig.cameras.iter_mut().zip(&self.true_rig.cameras) {
-            given.model = error.applied(&actual.model);
+    pub(crate) fn spoil_intrinsics(&mut self, error: &LensChange) {
+        for camera in &mut self.given_rig.cameras {
+            camera.model = error.camera(&camera.model);
         }
     }
 

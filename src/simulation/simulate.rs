@@ -11,11 +11,12 @@ use rayon::prelude::*;
 
 use super::aim::Aimed;
 use super::disturbances::{EXPOSURE_DRIFT, VIGNETTING};
-use super::equipment::{Equipment, IntrinsicsError, JOINT_TOPIC};
+use super::equipment::{Equipment, JOINT_TOPIC};
 use super::error::SimulationError;
 use super::experiment::{Experiment, WorldKind};
 use super::gimbal::JointMotion;
 use super::options::{SimulationOptions, SimulationProgress, SimulationSummary};
+use super::planting::Planting;
 use super::prescribed::PrescribedFlight;
 use super::random::RandomStream;
 use super::render::{RenderedView, Sensor, SensorOptions, SurfaceShader, Workspace};
@@ -195,10 +196,6 @@ fn fly_scenario(options: &SimulationOptions, name: &str) -> Result<Scenario, Sim
     if options.disturbances.imu_intrinsics != [0.0; 2] {
         scenario.miscalibrate_imu(options.disturbances.imu_intrinsics, &mut random(stream::IMU_INTRINSICS));
     }
-    let focal_ratio = options.disturbances.focal_ratio;
-    if focal_ratio != 0.0 {
-        scenario.spoil_intrinsics(&IntrinsicsError { focal_ratio, ..IntrinsicsError::default() });
-    }
     for sample in &mut scenario.imu_record.samples {
         if let Some(range) = options.disturbances.gyroscope_range_rad_per_s {
             sample.angular_velocity_rad_per_s.apply(|rate| *rate = rate.clamp(-range.abs(), range.abs()));
@@ -207,6 +204,7 @@ fn fly_scenario(options: &SimulationOptions, name: &str) -> Result<Scenario, Sim
             sample.specific_force_m_per_s2.apply(|force| *force = force.clamp(-range.abs(), range.abs()));
         }
     }
+    Planting::of(&options.disturbances).plant(&mut scenario)?;
     Ok(scenario)
 }
 
@@ -221,7 +219,7 @@ fn true_rig(options: &SimulationOptions, name: &str) -> Result<Rig, SimulationEr
         lens: options.lens,
         resolution_px: options.resolution_px,
         camera_rate_hz: options.camera_rate_hz,
-        camera_time_offset_s: options.disturbances.camera_time_offset_s,
+        camera_time_offset_s: Planting::of(&options.disturbances).camera_offset_s(),
         readout_s: options.disturbances.readout_s,
         encoder_sigma_rad: options.encoder_sigma_rad,
         gimbal_imu: options.gimbal_imu_noise_scale.is_some(),
@@ -297,7 +295,7 @@ fn write_messages(
             }
             Message::Joints(index) => {
                 let sample = &recordings.joints[index];
-                let stamp_ns = sample.stamp_ns + ns_from_seconds(options.disturbances.joint_lag_s);
+                let stamp_ns = studio.planting.joint_stamp_ns(sample.stamp_ns);
                 let topic = rig.gimbal.as_ref().and_then(|gimbal| gimbal.topic.as_deref()).unwrap_or(JOINT_TOPIC);
                 log.write_joints(topic, times(stamp_ns), &joint_names, &sample.angles_rad)?;
             }
@@ -345,8 +343,13 @@ fn recordings(options: &SimulationOptions, scenario: &Scenario) -> Recordings {
     let start_ns = ns_from_seconds(options.disturbances.joint_start_s);
     let mut joints = options.encoder_sigma_rad.map(|sigma| scenario.encoder_samples(sigma)).unwrap_or_default();
     joints.retain(|sample| sample.stamp_ns >= start_ns);
+    let planting = Planting::of(&options.disturbances);
+    let names = scenario.true_rig.joint_names();
+    for sample in &mut joints {
+        planting.plant_angles(&names, sample);
+    }
     let duration_s = scenario.trajectory.duration_s();
-    let shift_s = options.disturbances.camera_time_offset_s;
+    let shift_s = planting.camera_offset_s();
     // Earliest and latest exposure of a row, relative to the stamp.
     let rows_s = [options.disturbances.readout_s.min(0.0), options.disturbances.readout_s.max(0.0)];
     let mut shots = Vec::new();
@@ -411,6 +414,7 @@ struct Studio<'a> {
     scenario: &'a Scenario,
     renderer: SurfaceShader<'a>,
     cameras: Vec<(&'a CameraRig, RenderedView, Sensor)>,
+    planting: Planting,
 }
 
 impl<'a> Studio<'a> {
@@ -427,7 +431,8 @@ impl<'a> Studio<'a> {
             let sensor = Sensor::new(&view, sensor, seed);
             (camera, view, sensor)
         });
-        Self { options, scenario, renderer: SurfaceShader::new(world), cameras: cameras.collect() }
+        let planting = Planting::of(disturbances);
+        Self { options, scenario, renderer: SurfaceShader::new(world), cameras: cameras.collect(), planting }
     }
 
     /// Renders the images of some shots as JPEG, in their order.
@@ -450,7 +455,9 @@ impl<'a> Studio<'a> {
     ) -> Result<Vec<u8>, SimulationError> {
         let (camera, view, sensor) = &self.cameras[shot.camera];
         let disturbances = &self.options.disturbances;
-        let time_s = seconds_from_ns(shot.stamp_ns) + disturbances.camera_time_offset_s;
+        let time_s = seconds_from_ns(shot.stamp_ns) + self.planting.camera_offset_s();
+        let zoomed = self.planting.zoomed(&camera.model, time_s).map(|model| RenderedView::new(&model));
+        let view = zoomed.as_ref().unwrap_or(view);
         let end_s = self.scenario.trajectory.duration_s();
         radiance.clear();
         radiance.resize(view.pixels(), 0.0);
@@ -479,6 +486,7 @@ impl<'a> Studio<'a> {
             }
         }
         let image = sensor.expose(radiance, shot.frame_index, time_s);
+        let image = self.planting.flipped(&camera.model, time_s, image);
         let mut jpeg = Vec::with_capacity(image.pixels.len() / 4);
         let quality = disturbances.jpeg_quality.map_or(self.options.jpeg_quality, |quality| quality.round() as u8);
         JpegEncoder::new_with_quality(&mut jpeg, quality)

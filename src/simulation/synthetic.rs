@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Vector2, Vector3};
 
-use super::equipment::{Equipment, IntrinsicsError, Lens};
+use super::equipment::{Equipment, Lens};
 use super::exercise::Exercise;
 use super::experiment::Experiment;
 use super::gimbal::{JointMotion, LookAround};
@@ -14,6 +14,7 @@ use super::route::{Drill, Flight, Manoeuvres, Station};
 use super::scenario::{Scenario, ScenarioOptions, gravity_m_per_s2, stream};
 use super::trajectory::{Trajectory, VehicleLimits};
 use crate::camera::CameraModel;
+use crate::faults::LensChange;
 use crate::frontend::{FeatureId, FrontEndStatistics, TrackedFeature, TrackedFrame};
 use crate::geometry::{RigidTransform, median, ns_from_seconds};
 use crate::sensors::{ChainPrior, ImuSample, JointAngles, JointMotionFit, Rig};
@@ -63,8 +64,8 @@ pub struct SyntheticOptions {
     pub clock_offsets_s: [f64; 2],
     /// Readout of the camera: each landmark is observed at the time of its row. Absent from the given rig.
     pub readout_s: f64,
-    /// Errors of the given rig's intrinsics; bearings are computed with the given camera.
-    pub intrinsics_error: IntrinsicsError,
+    /// Intrinsics of the given rig relative to the true ones; bearings are computed with the given camera.
+    pub intrinsics_error: LensChange,
     /// Standard deviations of the errors of the IMU's scales, and of its angles in radians (misalignment, rotation
     /// between the sensors). Absent from the given rig; zeros for an ideal IMU.
     pub imu_intrinsics_error: [f64; 2],
@@ -96,7 +97,7 @@ impl Default for SyntheticOptions {
             gimbal_imu: false,
             clock_offsets_s: [0.0; 2],
             readout_s: 0.0,
-            intrinsics_error: IntrinsicsError::default(),
+            intrinsics_error: LensChange::NONE,
             imu_intrinsics_error: [0.0; 2],
             accelerometer_drift: None,
             start_error: Experiment::T1.start_error(),
@@ -259,9 +260,7 @@ fn spoil(scenario: &mut Scenario, options: &SyntheticOptions) {
         let mut random = RandomStream::new(options.seed, stream::IMU_INTRINSICS);
         scenario.miscalibrate_imu(options.imu_intrinsics_error, &mut random);
     }
-    if options.intrinsics_error != IntrinsicsError::default() {
-        scenario.spoil_intrinsics(&options.intrinsics_error);
-    }
+    scenario.spoil_intrinsics(&options.intrinsics_error);
 }
 
 /// Flight around the house of T1, or at one position.

@@ -1,6 +1,7 @@
 mod flight;
 mod images;
 mod logs;
+mod planting;
 mod prescribed;
 mod synthetic;
 mod tracking;

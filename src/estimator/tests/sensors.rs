@@ -6,8 +6,9 @@ use super::fixture;
 use super::flight::{chain_error, run_flight_by_rows, trajectory_error_m};
 use crate::estimator::config::{EstimatorConfig, EstimatorOptions};
 use crate::estimator::report::StepReport;
+use crate::faults::LensChange;
 use crate::gimbal::{ParameterId, ParameterNames, Parameterization};
-use crate::simulation::{IntrinsicsError, SyntheticFlight, SyntheticMount, SyntheticOptions, synthetic_tracks};
+use crate::simulation::{SyntheticFlight, SyntheticMount, SyntheticOptions, synthetic_tracks};
 
 const READOUT_S: f64 = 0.03;
 
@@ -80,7 +81,7 @@ fn a_focal_length_with_an_error_of_a_percent_is_corrected() {
     let plain = options(SyntheticMount::Static, 1);
     let (reference_m, _, _) = run(&synthetic_tracks(&plain), |_| {});
     let flight = synthetic_tracks(&SyntheticOptions {
-        intrinsics_error: IntrinsicsError { focal_ratio: 0.01, ..IntrinsicsError::default() },
+        intrinsics_error: LensChange { focal: 1.01, ..LensChange::NONE },
         ..plain
     });
     let (_, ignored_chain_m, _) = run(&flight, |_| {});
@@ -95,7 +96,7 @@ fn a_focal_length_with_an_error_of_a_percent_is_corrected() {
 #[test]
 fn a_wrong_focal_length_is_named_in_the_warning() {
     let flight = synthetic_tracks(&SyntheticOptions {
-        intrinsics_error: IntrinsicsError { focal_ratio: 0.03, ..IntrinsicsError::default() },
+        intrinsics_error: LensChange { focal: 1.03, ..LensChange::NONE },
         ..options(SyntheticMount::Static, 1)
     });
     let (_, warnings) = ignored(&flight);

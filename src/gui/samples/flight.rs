@@ -9,13 +9,14 @@ use std::sync::{Arc, LazyLock};
 use rayon::prelude::*;
 
 use crate::estimator::{Estimator, EstimatorConfig, EstimatorOptions, StepInput};
+use crate::faults::LensChange;
 use crate::flight_log::{LogWarning, WarningKind};
 use crate::gimbal::{Chain, Parameterization, auto_parameterization};
 use crate::observability::analyse;
 use crate::sensors::Rig;
 use crate::session::tests::memory::recorded;
 use crate::session::{Recording, RunRecord, StepRecord};
-use crate::simulation::{IntrinsicsError, SyntheticFlight, SyntheticMount, SyntheticOptions, synthetic_tracks};
+use crate::simulation::{SyntheticFlight, SyntheticMount, SyntheticOptions, synthetic_tracks};
 
 /// Period of the images in nanoseconds (20 Hz).
 pub(crate) const FRAME_PERIOD_NS: i64 = 50_000_000;
@@ -84,7 +85,7 @@ pub(crate) fn sensor_recording() -> Recording {
             duration_s: 6.0,
             features: 70,
             readout_s: 0.02,
-            intrinsics_error: IntrinsicsError { focal_ratio: 0.01, ..IntrinsicsError::default() },
+            intrinsics_error: LensChange { focal: 1.01, ..LensChange::NONE },
             imu_intrinsics_error: [0.01, 0.01],
             ..SyntheticOptions::default()
         });

@@ -3,7 +3,7 @@
 use nalgebra::Vector2;
 
 use crate::camera::CameraModel;
-use crate::faults::{Fault, FaultKind, Sensor, correct_joint_angles};
+use crate::faults::{Fault, FaultKind, Sensor, check_joints, correct_joint_angles};
 use crate::frontend::{TrackedFeature, TrackedFrame};
 use crate::geometry::{ns_from_seconds, seconds_from_ns};
 use crate::sensors::{ImuSample, JointAngles, Rig};
@@ -33,12 +33,8 @@ impl MeasurementCorrections {
     /// If the rig has no such joint.
     pub(super) fn of(faults: &[Fault], rig: &Rig, camera_key: &str) -> Result<Self, ForkError> {
         let joint_names = rig.joint_names();
-        if let Some(name) = faults.iter().flat_map(|fault| &fault.joints).find(|name| !joint_names.contains(name)) {
-            return Err(ForkError::BadChange {
-                text: format!("correct=…:{name}"),
-                problem: format!("the rig has no joint '{name}'; it has: {}", joint_names.join(", ")),
-            });
-        }
+        check_joints(faults, &joint_names)
+            .map_err(|problem| ForkError::BadChange { text: "correct=…".to_owned(), problem })?;
         let changes_images = faults.iter().any(|fault| fault.corrects(Sensor::Camera));
         let camera = rig.camera(camera_key).ok().filter(|_| changes_images).map(|camera| camera.model.clone());
         let has_offset = faults.iter().any(|fault| fault.kind == FaultKind::JointOffset);

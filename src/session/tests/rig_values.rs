@@ -1,16 +1,17 @@
 //! A rig's values of estimated parameters, and a run's values in a rig.
 
 use super::memory::estimated;
+use crate::faults::LensChange;
 use crate::gimbal::tests::parameter;
 use crate::gimbal::{ParameterGroup, ParameterId, Quantity};
 use crate::observability::Determination;
 use crate::session::FlightVerdicts;
-use crate::simulation::{IntrinsicsError, SyntheticOptions, synthetic_tracks};
+use crate::simulation::{SyntheticOptions, synthetic_tracks};
 use crate::text::Named as _;
 
 #[test]
 fn every_estimated_parameter_has_a_value_in_a_rig_and_leads_back_to_it() {
-    let intrinsics_error = IntrinsicsError { focal_ratio: 0.01, ..IntrinsicsError::default() };
+    let intrinsics_error = LensChange { focal: 1.01, ..LensChange::NONE };
     let flight = synthetic_tracks(&SyntheticOptions {
         duration_s: 5.0,
         features: 60,

@@ -1,6 +1,7 @@
 use nalgebra::Vector3;
 
-use super::super::{IntrinsicsError, SyntheticMotion, SyntheticMount, SyntheticOptions, synthetic_tracks};
+use super::super::{SyntheticMotion, SyntheticMount, SyntheticOptions, synthetic_tracks};
+use crate::faults::LensChange;
 use crate::geometry::{RigidTransform, so3};
 
 fn short(mount: SyntheticMount, motion: SyntheticMotion) -> SyntheticOptions {
@@ -72,7 +73,7 @@ fn the_imu_measures_with_its_scales_and_axes_and_drifts() {
     let wrong = SyntheticOptions {
         imu_intrinsics_error: [0.01, 0.02],
         accelerometer_drift: Some([0.02, 3.0]),
-        intrinsics_error: IntrinsicsError { focal_ratio: 0.01, centre_px: [2.0, -1.0], distortion: [0.0; 2] },
+        intrinsics_error: LensChange { focal: 1.01, centre: [0.0055, -0.0028] },
         ..plain.clone()
     };
     let (plain, wrong) = (synthetic_tracks(&plain), synthetic_tracks(&wrong));
