@@ -105,27 +105,29 @@ fn on_gimbal(run: &DiagnosedRun<'_>) -> bool {
 
 /// Parameters that the run could estimate, and a wider prior of the chain.
 fn estimated_columns(run: &DiagnosedRun<'_>) -> Vec<TrialHypothesis> {
-    let spec = run.spec;
-    if !spec.calibrate {
+    use FaultKind::{Clocks, ImuIntrinsics, Intrinsics, Shutter};
+    if !run.spec.calibrate {
         return Vec::new();
     }
-    let intrinsics = run.rig.camera(run.camera_key).map_or(4, |camera| camera.model.intrinsic_count());
-    let columns = [
-        (FaultKind::Clocks, SensorParameters::Timeshift, spec.timeshift, 1 + usize::from(uses_encoders(run))),
-        (FaultKind::Shutter, SensorParameters::Readout, spec.readout, 1),
-        (FaultKind::Intrinsics, SensorParameters::Intrinsics, spec.intrinsics, intrinsics),
-        (FaultKind::ImuIntrinsics, SensorParameters::ImuIntrinsics, spec.imu_intrinsics, 15),
-    ];
-    let mut all: Vec<TrialHypothesis> = columns
-        .into_iter()
-        .filter(|(_, _, estimated, _)| !estimated)
-        .map(|(cause, columns, _, parameters)| {
-            let changes = ForkChanges { estimated: [columns].into(), ..ForkChanges::default() };
-            TrialHypothesis::change(cause, changes, parameters)
-        })
-        .collect();
-    all.extend(wider_chain_priors(run));
-    all
+    let columns = [Clocks, Shutter, Intrinsics, ImuIntrinsics].into_iter().filter_map(|cause| estimate(run, cause));
+    columns.chain(wider_chain_priors(run)).collect()
+}
+
+/// Estimate of the parameters whose error is a cause; `None` if the run estimates them.
+pub(super) fn estimate(run: &DiagnosedRun<'_>, cause: FaultKind) -> Option<TrialHypothesis> {
+    let spec = run.spec;
+    let (columns, is_estimated, parameters) = match cause {
+        FaultKind::Clocks => (SensorParameters::Timeshift, spec.timeshift, 1 + usize::from(uses_encoders(run))),
+        FaultKind::Shutter => (SensorParameters::Readout, spec.readout, 1),
+        FaultKind::Intrinsics => {
+            let count = run.rig.camera(run.camera_key).map_or(4, |camera| camera.model.intrinsic_count());
+            (SensorParameters::Intrinsics, spec.intrinsics, count)
+        }
+        FaultKind::ImuIntrinsics => (SensorParameters::ImuIntrinsics, spec.imu_intrinsics, 15),
+        _ => return None,
+    };
+    let changes = ForkChanges { estimated: [columns].into(), ..ForkChanges::default() };
+    (!is_estimated).then(|| TrialHypothesis::change(cause, changes, parameters))
 }
 
 /// Wider priors of the chain.

@@ -5,17 +5,17 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::axes::PlausibleAxes;
-use super::hypotheses::{TrialHypothesis, ZOOM_S, axes_hypotheses, corrections, uses_encoders, wider_chain_priors};
+use super::hypotheses::{
+    TrialHypothesis, ZOOM_S, axes_hypotheses, corrections, estimate, uses_encoders, wider_chain_priors,
+};
 use super::trial::DiagnosedRun;
 use super::tuning::rounded;
-use crate::estimator::SensorParameters;
 use crate::faults::{Fault, FaultKind, LONGEST_SHIFT_S, Sensor, Severity};
 use crate::flight_log::FlightLog;
 use crate::geometry::ns_from_seconds;
 use crate::log_check::{self, Finding};
 use crate::sensors::Rig;
 use crate::session::engine::image_rotations;
-use crate::session::plan::ForkChanges;
 
 /// Changes that undo measured faults.
 #[derive(Debug, Default)]
@@ -70,10 +70,11 @@ fn hypotheses(run: &DiagnosedRun<'_>, fault: &Fault) -> Option<Vec<TrialHypothes
     let digits = |value: &f64| if fault.kind == FaultKind::JointScale { *value } else { rounded(*value) };
     let values: Vec<f64> = fault.values.iter().map(digits).collect();
     Some(match (fault.kind, values.as_slice()) {
-        (FaultKind::PrincipalPoint | FaultKind::Intrinsics, _) => {
-            column(run, FaultKind::Intrinsics, SensorParameters::Intrinsics, run.spec.intrinsics, 4)?
+        (FaultKind::PrincipalPoint | FaultKind::Intrinsics | FaultKind::Shutter, _) => {
+            let is_shutter = fault.kind == FaultKind::Shutter;
+            let estimate = estimate(run, if is_shutter { fault.kind } else { FaultKind::Intrinsics })?;
+            if run.spec.calibrate { vec![estimate] } else { Vec::new() }
         }
-        (FaultKind::Shutter, _) => column(run, fault.kind, SensorParameters::Readout, run.spec.readout, 1)?,
         (FaultKind::Chain, _) if run.spec.calibrate => wider_chain_priors(run).collect(),
         (FaultKind::ImageFlip, _) => corrections(&[fault.kind], &[]),
         (FaultKind::FocalPieces, [_, _, _, factor]) => {
@@ -99,19 +100,6 @@ fn hypotheses(run: &DiagnosedRun<'_>, fault: &Fault) -> Option<Vec<TrialHypothes
         }
         _ => Vec::new(),
     })
-}
-
-/// Estimate of columns, none in a run without calibration; `None` if the run estimates them.
-fn column(
-    run: &DiagnosedRun<'_>,
-    cause: FaultKind,
-    columns: SensorParameters,
-    is_estimated: bool,
-    parameters: usize,
-) -> Option<Vec<TrialHypothesis>> {
-    let changes = ForkChanges { estimated: [columns].into(), ..ForkChanges::default() };
-    let estimate = run.spec.calibrate.then(|| TrialHypothesis::change(cause, changes, parameters));
-    (!is_estimated).then(|| estimate.into_iter().collect())
 }
 
 /// Result of the check of a log, made for the first run that needs it.
