@@ -11,10 +11,11 @@ use crate::faults::{Fault, correct_joint_angles};
 use crate::flight_log::{FlightLog, FrameStream, SensorFrame};
 use crate::sensors::{JointAngles, Rig};
 
-/// Rig and frames of the gimbal camera of a short flight with faults, its images without noise.
+/// Rig and frames of the gimbal camera of a short flight with faults, its images without noise, its encoders with little.
 fn recorded(faults: &[&str], folder: &Path) -> (Rig, Vec<SensorFrame>) {
     let mut options = SimulationOptions { image_noise: 0.0, jpeg_quality: 100, ..small(Experiment::T3) };
     options.static_camera = false;
+    options.encoder_sigma_rad = Some(1e-5);
     for fault in faults {
         options.disturbances.set(fault).unwrap();
     }
