@@ -4,7 +4,8 @@ use crate::calibration::stills::StillsOutcome;
 use crate::flight_log::rig_template::TYPICAL_IMU_NOISE;
 use crate::geometry::Dimension;
 use crate::sensors::{
-    AssumedField, CameraMount, CameraRig, ChainPrior, GimbalRig, ImuIntrinsics, ImuRig, Joint, Rig, StillCamera, Stills,
+    AssumedField, CameraMount, CameraRig, ChainPrior, GimbalRig, ImuIntrinsics, ImuRig, Joint, RequiredAccuracy, Rig,
+    StillCamera, Stills,
 };
 
 /// Rate of images and joint angles, in Hz: stills have none.
@@ -70,6 +71,7 @@ pub(super) fn rig_of_stills(stills: &Stills, outcome: &StillsOutcome) -> Rig {
         ground_truth_topic: None,
         ground_truth_use_log_time: false,
         ground_truth_lever_arm: None,
+        required_accuracy: RequiredAccuracy::default(),
         assumed: vec![
             reason("imu0", "the stills have no IMU, topic, rate and noise are placeholders".to_owned()),
             reason("gimbal.T_I_B", format!("the stills have no IMU, I is the frame of the rigid camera {first}")),

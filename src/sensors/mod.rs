@@ -9,6 +9,7 @@ mod imu_intrinsics;
 mod joints;
 mod named_axes;
 mod pose;
+mod required_accuracy;
 mod rig;
 mod stills;
 
@@ -22,6 +23,7 @@ pub use imu_intrinsics::{ImuIntrinsics, ImuIntrinsicsParameters, KalibrImuMatric
 pub use joints::{JointAngles, JointMotionFit, JointSample};
 pub use named_axes::{BodyAxes, NamedAxes};
 pub use pose::{LeverArm, MAX_LEVER_ARM_M, NEAREST_POSE_NS, PoseSample, PoseTrack, PositionSample};
+pub use required_accuracy::RequiredAccuracy;
 pub use rig::{
     AssumedField, CameraMask, CameraMount, CameraRig, ChainPrior, GimbalImuRig, GimbalRig, ImuRig, IntrinsicsSigma,
     Joint, Rig, UnknownCamera,

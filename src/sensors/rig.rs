@@ -2,7 +2,7 @@
 
 use nalgebra::UnitQuaternion;
 
-use super::{AttitudeFrame, AttitudeSource, ImageMask, ImuIntrinsics, ImuNoise, LeverArm};
+use super::{AttitudeFrame, AttitudeSource, ImageMask, ImuIntrinsics, ImuNoise, LeverArm, RequiredAccuracy};
 use crate::camera::CameraModel;
 use crate::geometry::RigidTransform;
 use crate::gimbal::{ClassicalChain, InverseChain, ParameterNames, Quantity};
@@ -215,6 +215,8 @@ pub struct Rig {
     pub ground_truth_use_log_time: bool,
     /// Position of that antenna, `None` if the rig does not give it.
     pub ground_truth_lever_arm: Option<LeverArm>,
+    /// Accuracy that the calibration must reach.
+    pub required_accuracy: RequiredAccuracy,
     /// Fields that have not been measured yet.
     pub assumed: Vec<AssumedField>,
 }

@@ -9,8 +9,8 @@ use crate::camera::{CameraModel, Distortion, Projection};
 use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::ClassicalChain;
 use crate::sensors::{
-    CameraMount, CameraRig, ChainPrior, GimbalImuRig, GimbalRig, ImuIntrinsics, ImuIntrinsicsParameters, ImuRig, Rig,
-    ScaleMisalignment,
+    CameraMount, CameraRig, ChainPrior, GimbalImuRig, GimbalRig, ImuIntrinsics, ImuIntrinsicsParameters, ImuRig,
+    RequiredAccuracy, Rig, ScaleMisalignment,
 };
 use crate::text::Named;
 
@@ -130,6 +130,7 @@ impl Equipment {
             ground_truth_topic: Some(GROUND_TRUTH_TOPIC.to_owned()),
             ground_truth_use_log_time: false,
             ground_truth_lever_arm: None,
+            required_accuracy: RequiredAccuracy::default(),
             assumed: Vec::new(),
         }
     }

@@ -8,7 +8,7 @@ use super::read;
 use crate::files::FileError;
 use crate::files::located::Located;
 use crate::geometry::RigidTransform;
-use crate::sensors::{CameraMount, Rig};
+use crate::sensors::{CameraMount, RequiredAccuracy, Rig};
 
 /// Usual names of Kalibr's IMU file.
 const IMU_FILES: [&str; 3] = ["imu.yaml", "imu0.yaml", "imu-calib.yaml"];
@@ -58,6 +58,7 @@ pub(crate) fn read_camera_chain(
         ground_truth_topic: None,
         ground_truth_use_log_time: false,
         ground_truth_lever_arm: None,
+        required_accuracy: RequiredAccuracy::default(),
         assumed: Vec::new(),
     })
 }

@@ -14,7 +14,18 @@ struct Keys {
 }
 
 const ROOT: Keys = Keys {
-    read: &["rig_version", "name", "gravity", "imu0", "imu1", "cam0", "gimbal", "ground_truth", "assumed"],
+    read: &[
+        "rig_version",
+        "name",
+        "gravity",
+        "imu0",
+        "imu1",
+        "cam0",
+        "gimbal",
+        "ground_truth",
+        "required_accuracy",
+        "assumed",
+    ],
     // Written by `dcvins calibrate` and `dcvins simulate` at the end of a rig.
     unused: APPENDICES,
 };
@@ -107,6 +118,7 @@ const SOURCE: Keys = Keys {
 const CHAIN: Keys = Keys { read: &["T_I_B", "links", "T_E_C"], unused: &[] };
 const PRIOR: Keys = Keys { read: &["translation_bound", "rotation_bound"], unused: &[] };
 const LINK: Keys = Keys { read: &["joint", "theta_offset", "d", "a", "alpha", "limits"], unused: &[] };
+const REQUIRED_ACCURACY: Keys = Keys { read: &["translation", "rotation"], unused: &[] };
 const GROUND_TRUTH: Keys = Keys { read: &["rostopic", "use_log_time", "lever_arm"], unused: &["frame_id"] };
 
 /// Keys of a document that are not read.
@@ -145,6 +157,7 @@ pub(super) fn is_of_mapping(key: &str, mapping: &str) -> bool {
     let keys = match mapping {
         "gimbal" => &GIMBAL,
         "ground_truth" => &GROUND_TRUTH,
+        "required_accuracy" => &REQUIRED_ACCURACY,
         mapping if is_numbered(mapping, "cam") => &CAMERA,
         "imu1" => &GIMBAL_IMU,
         mapping if is_numbered(mapping, "imu") => &IMU,
@@ -166,6 +179,7 @@ fn check_root(document: &Located, found: &mut Found) {
             "imu1" if value.get("mount").is_some() => check_imu(value, key, &GIMBAL_IMU, found),
             "gimbal" => check_gimbal(value, found),
             "ground_truth" => check_mapping(value, key, &GROUND_TRUTH, found),
+            "required_accuracy" => check_mapping(value, key, &REQUIRED_ACCURACY, found),
             key if is_numbered(key, "cam") => check_camera(value, key, found),
             // Kalibr's files may have several IMUs on the vehicle, of which the first is used.
             key if is_numbered(key, "imu") => found.unused.push(key.to_owned()),

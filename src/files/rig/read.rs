@@ -10,7 +10,7 @@ use crate::files::FileError;
 use crate::gimbal::{ClassicalChain, InverseChain};
 use crate::sensors::{
     AssumedField, CameraMount, CameraRig, ChainPrior, GimbalImuRig, GimbalRig, ImuNoise, ImuRig, Joint, LeverArm,
-    MAX_LEVER_ARM_M, Rig,
+    MAX_LEVER_ARM_M, RequiredAccuracy, Rig,
 };
 use crate::text::shortened;
 
@@ -59,6 +59,7 @@ pub(crate) fn read_rig(root: &Field<'_>, default_name: &str, facts: &dyn CameraF
     let ground_truth_topic = ground_truth_topic.map(|topic| topic.text("a topic").map(str::to_owned)).transpose()?;
     let ground_truth_use_log_time = root.field("ground_truth").field("use_log_time").flag()?;
     let ground_truth_lever_arm = read_lever_arm(root.field("ground_truth").field("lever_arm"))?;
+    let required_accuracy = read_required_accuracy(&root.field("required_accuracy"))?;
     let assumed = read_assumed(root)?;
     Ok(Rig {
         name,
@@ -70,6 +71,7 @@ pub(crate) fn read_rig(root: &Field<'_>, default_name: &str, facts: &dyn CameraF
         ground_truth_topic,
         ground_truth_use_log_time,
         ground_truth_lever_arm,
+        required_accuracy,
         assumed,
     })
 }
@@ -86,6 +88,18 @@ fn read_lever_arm(field: Field<'_>) -> Result<Option<LeverArm>, FileError> {
         return Err(field.unexpected("metres, at most 100 in each direction"));
     }
     Ok(Some(LeverArm::Known(lever_arm_m)))
+}
+
+/// Reads the accuracy that the calibration must reach; the defaults stand for values that are not given.
+fn read_required_accuracy(field: &Field<'_>) -> Result<RequiredAccuracy, FileError> {
+    let given = |key: &str, expected: &str, default: f64| {
+        field.field(key).optional().map_or(Ok(default), |value| value.positive(expected))
+    };
+    let defaults = RequiredAccuracy::default();
+    Ok(RequiredAccuracy {
+        translation_m: given("translation", "a standard deviation in metres", defaults.translation_m)?,
+        rotation_rad: given("rotation", "a standard deviation in radians", defaults.rotation_rad)?,
+    })
 }
 
 /// Reads the assumed fields; an error if the rig lacks one of them.

@@ -10,7 +10,8 @@ use crate::files::yaml::{number, numbers, text};
 use crate::geometry::RigidTransform;
 use crate::gimbal::DhLink;
 use crate::sensors::{
-    AssumedField, CameraMount, CameraRig, GimbalImuRig, GimbalRig, ImuIntrinsics, ImuRig, LeverArm, Rig,
+    AssumedField, CameraMount, CameraRig, GimbalImuRig, GimbalRig, ImuIntrinsics, ImuRig, LeverArm, RequiredAccuracy,
+    Rig,
 };
 
 impl Rig {
@@ -65,6 +66,12 @@ impl Rig {
             Some(LeverArm::Known(position_m)) => line(&mut out, 1, "lever_arm", &numbers(position_m.as_slice())),
             Some(LeverArm::Estimated) => line(&mut out, 1, "lever_arm", "estimate"),
             None => {}
+        }
+        if self.required_accuracy != RequiredAccuracy::default() {
+            let RequiredAccuracy { translation_m, rotation_rad } = self.required_accuracy;
+            line(&mut out, 0, "required_accuracy", "");
+            line(&mut out, 1, "translation", &number(translation_m));
+            line(&mut out, 1, "rotation", &number(rotation_rad));
         }
         if !self.assumed.is_empty() {
             line(&mut out, 0, "assumed", "");

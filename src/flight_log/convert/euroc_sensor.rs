@@ -15,7 +15,7 @@ use crate::files::FileError;
 use crate::files::limits::LINE_BYTES;
 use crate::flight_log::container::file::kind_of;
 use crate::geometry::{RigidTransform, seconds_from_ns};
-use crate::sensors::{CameraMount, CameraRig, GimbalRig, ImuIntrinsics, ImuNoise, ImuRig, Rig};
+use crate::sensors::{CameraMount, CameraRig, GimbalRig, ImuIntrinsics, ImuNoise, ImuRig, RequiredAccuracy, Rig};
 use crate::text::without_bom;
 
 pub(super) const IMU_TOPIC: &str = "/imu0";
@@ -157,6 +157,7 @@ pub(super) fn rig_of(
         ground_truth_topic,
         ground_truth_use_log_time: false,
         ground_truth_lever_arm: None,
+        required_accuracy: RequiredAccuracy::default(),
         assumed: Vec::new(),
     })
 }
@@ -283,6 +284,7 @@ pub fn rig_of_euroc_folder(rig: &Rig, cameras: &[&CameraRig], has_joints: bool, 
         ground_truth_topic: has_ground_truth.then(|| pose_topic(EUROC_GROUND_TRUTH)),
         ground_truth_use_log_time: false,
         ground_truth_lever_arm: None,
+        required_accuracy: RequiredAccuracy::default(),
         ..rig.clone()
     }
 }

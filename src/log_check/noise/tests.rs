@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::samples::ImuSeries;
 use super::{AllanReport, NoiseTerm, measure};
 use crate::geometry::{SplitMix64, ns_from_seconds};
-use crate::sensors::{ImuIntrinsics, ImuNoise, ImuRig, Rig};
+use crate::sensors::{ImuIntrinsics, ImuNoise, ImuRig, RequiredAccuracy, Rig};
 
 const RATE_HZ: f64 = 100.0;
 
@@ -95,6 +95,7 @@ fn rig() -> Rig {
         ground_truth_topic: None,
         ground_truth_use_log_time: false,
         ground_truth_lever_arm: None,
+        required_accuracy: RequiredAccuracy::default(),
         assumed: Vec::new(),
     }
 }

@@ -19,7 +19,7 @@ use crate::camera::CameraModel;
 use crate::files::urdf::DescribedChain;
 use crate::sensors::{
     AssumedField, AttitudeSource, BodyAxes, CameraMount, CameraRig, ChainPrior, GimbalImuRig, GimbalRig, ImuIntrinsics,
-    ImuNoise, ImuRig, IntrinsicsSigma, Rig,
+    ImuNoise, ImuRig, IntrinsicsSigma, RequiredAccuracy, Rig,
 };
 
 /// Standard deviations of intrinsics from a field of view: of the focal length as a ratio (manufacturers round, crop
@@ -187,6 +187,7 @@ impl RigTemplate {
             ground_truth_topic: self.ground_truth_topic.clone(),
             ground_truth_use_log_time: false,
             ground_truth_lever_arm: None,
+            required_accuracy: RequiredAccuracy::default(),
             assumed: self.assumed_fields(),
         }
     }
