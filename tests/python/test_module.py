@@ -113,7 +113,7 @@ class Runs(unittest.TestCase):
 class OtherCommands(unittest.TestCase):
     def test_a_check_has_findings(self):
         found = dcvins.check(LOG)
-        self.assertEqual((found.usability, found.errors), ("usable", ()))
+        self.assertEqual((found.trust, found.errors), ("trusted", ()))
         self.assertIn("/imu", found.topics["topic"].tolist())
         self.assertIn("<table>", found._repr_html_())
         with tempfile.TemporaryDirectory() as folder:

@@ -31,8 +31,10 @@ class Finding:
 class Check:
     """Verdict and findings on a log and its rig."""
 
-    #: usable, usable with care or not usable.
-    usability: str
+    #: trusted, doubtful or not_usable.
+    trust: str
+    #: The verdict in one sentence.
+    sentence: str
     findings: Tuple[Finding, ...]
     #: The printed JSON as a whole.
     json: Dict[str, Any]
@@ -54,12 +56,12 @@ class Check:
 
     def __str__(self) -> str:
         shown = [finding for finding in self.findings if finding.severity != "good"]
-        return "\n".join([self.usability, *map(str, shown)])
+        return "\n".join([self.sentence, *map(str, shown)])
 
     def _repr_html_(self) -> str:
         rows = [(found.severity, found.area, found.title, found.evidence, found.remedy) for found in self.findings]
         head = ("severity", "area", "title", "evidence", "remedy")
-        return f"<p><b>{self.usability}</b></p>" + html_table(head, rows)
+        return f"<p><b>{self.sentence}</b></p>" + html_table(head, rows)
 
 
 def check(log: StrPath, *, rig: Optional[StrPath] = None) -> Check:
@@ -67,4 +69,4 @@ def check(log: StrPath, *, rig: Optional[StrPath] = None) -> Check:
     found = call_json(["check", text(log), *options(rig=rig)], _CHECKED)
     names = Finding.__dataclass_fields__
     findings = tuple(Finding(**{name: finding.get(name) or "" for name in names}) for finding in found["findings"])
-    return Check(found["verdict"]["usability"], findings, found)
+    return Check(found["verdict"]["trust"], found["verdict"]["sentence"], findings, found)

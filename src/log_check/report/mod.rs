@@ -33,6 +33,13 @@ pub struct Finding {
     pub faults: Vec<Fault>,
 }
 
+impl Finding {
+    /// Time from which on its fault acts, in seconds since the log began; `None` for one that acts from the start.
+    pub fn since_s(&self) -> Option<f64> {
+        self.faults.first().and_then(|fault| fault.since_s)
+    }
+}
+
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TopicReport {
     pub topic: String,

@@ -1,31 +1,93 @@
-//! The first lines of a check: whether the log can be used, and what to do first.
+//! The first lines of a check: whether results of the log can be trusted, and what to do first.
 
 use std::fmt::{Display, Formatter, Result};
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use super::{Area, CheckReport, Finding, Severity};
-use crate::text::{counted, printable};
+use crate::text::{Named, counted, printable};
 
+/// Sentence about a log whose results nothing speaks against.
+const NO_FAULT: &str = "No fault found in the log and its rig";
 /// Number of findings that a verdict names.
 const NAMED: usize = 3;
 
-/// Trust in the results of a log.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Usability {
-    /// No errors and no warnings.
-    Usable,
-    /// Warnings only: results are degraded, or something could not be verified.
-    UsableWithCare,
-    /// An error makes results invalid until it is corrected.
+/// Trust in the results of a log or of a run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Trust {
+    /// Nothing speaks against the results.
+    #[default]
+    Trusted,
+    /// Results are degraded, or something could not be verified.
+    Doubtful,
+    /// Results are invalid until a fault is corrected.
     NotUsable,
 }
 
-/// Usability of a log with its most important findings.
+impl Named for Trust {
+    const NAMES: &'static [(Self, &'static str)] =
+        &[(Self::Trusted, "trusted"), (Self::Doubtful, "doubtful"), (Self::NotUsable, "not usable")];
+}
+
+impl Serialize for Trust {
+    fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
+        serializer.serialize_str(&self.name().replace(' ', "_"))
+    }
+}
+
+impl Trust {
+    /// Symbol before a sentence; unique without a colour.
+    pub const fn mark(self) -> &'static str {
+        match self {
+            Self::Trusted => "✔",
+            Self::Doubtful => "⚠",
+            Self::NotUsable => "✖",
+        }
+    }
+
+    /// Trust that a finding leaves; [`Self::Trusted`] for notes, and for values of the rig that are only assumed.
+    pub fn after(finding: &Finding) -> Self {
+        match finding.severity {
+            Severity::Error => Self::NotUsable,
+            Severity::Warning if !finding.is_assumption => Self::Doubtful,
+            Severity::Warning | Severity::Note | Severity::Good => Self::Trusted,
+        }
+    }
+
+    /// First sentence of window, command line and report about results that are not trusted:
+    /// `✖ Not usable: joint 'yaw' counts in the other direction than in the rig`.
+    pub fn sentence(self, since_s: Option<f64>, statement: &str) -> String {
+        let since = since_s.map_or_else(String::new, |since_s| format!(" since {since_s:.1} s"));
+        let name = match self {
+            Self::Trusted => "Trusted",
+            Self::Doubtful => "Doubtful",
+            Self::NotUsable => "Not usable",
+        };
+        format!("{} {name}{since}: {statement}", self.mark())
+    }
+}
+
+/// Statement of the findings with the largest effect: the first one, or causes that are about equally likely.
+pub fn joint_statement(findings: &[&Finding]) -> String {
+    let alternatives: Vec<&str> = findings.iter().map_while(|it| it.title.strip_prefix(MOST_LIKELY)).collect();
+    match (alternatives.as_slice(), findings.first()) {
+        ([first, others @ ..], _) => {
+            others.iter().fold(format!("{MOST_LIKELY}{first}"), |all, other| format!("{all}, or {other}"))
+        }
+        ([], Some(first)) => first.title.clone(),
+        ([], None) => String::new(),
+    }
+}
+
+/// First words of the title of a cause that is not the only one.
+const MOST_LIKELY: &str = "most likely ";
+
+/// Trust in the results of a log, with its most important findings.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Verdict {
-    pub usability: Usability,
+    pub trust: Trust,
+    /// The verdict in one sentence.
+    pub sentence: String,
     pub errors: usize,
     pub warnings: usize,
     /// At most three errors and warnings, those with the largest effect on a result first.
@@ -36,17 +98,19 @@ impl Verdict {
     pub(crate) fn of(findings: &[Finding]) -> Self {
         let count = |severity: Severity| findings.iter().filter(|finding| finding.severity == severity).count();
         let (errors, warnings) = (count(Severity::Error), count(Severity::Warning));
-        let usability = match (errors, warnings) {
-            (0, 0) => Usability::Usable,
-            (0, _) => Usability::UsableWithCare,
-            _ => Usability::NotUsable,
-        };
+        let trust = findings.iter().map(Trust::after).max().unwrap_or_default();
         let mut problems: Vec<&Finding> =
             findings.iter().filter(|finding| finding.severity >= Severity::Warning).collect();
         problems
             .sort_by_key(|finding| (std::cmp::Reverse(finding.severity), finding.is_assumption, effect(finding.area)));
+        let sentence = match trust {
+            Trust::Trusted => format!("{} {NO_FAULT}", trust.mark()),
+            Trust::Doubtful | Trust::NotUsable => {
+                trust.sentence(problems.first().and_then(|it| it.since_s()), &joint_statement(&problems))
+            }
+        };
         let first = problems.into_iter().take(NAMED).cloned().collect();
-        Self { usability, errors, warnings, first }
+        Self { trust, sentence, errors, warnings, first }
     }
 }
 
@@ -66,7 +130,7 @@ fn effect(area: Area) -> u8 {
 }
 
 impl CheckReport {
-    /// Usability of the log with the findings that matter most.
+    /// Trust in the results of the log, with the findings that matter most.
     pub fn verdict(&self) -> Verdict {
         Verdict::of(&self.findings)
     }
@@ -74,11 +138,9 @@ impl CheckReport {
 
 impl Display for Verdict {
     fn fmt(&self, out: &mut Formatter<'_>) -> Result {
-        let (errors, warnings) = (counted(self.errors, "error"), counted(self.warnings, "warning"));
-        match self.usability {
-            Usability::Usable => writeln!(out, "usable: no errors and no warnings")?,
-            Usability::UsableWithCare => writeln!(out, "usable with care: {warnings}")?,
-            Usability::NotUsable => writeln!(out, "not usable as it is: {errors} and {warnings}")?,
+        writeln!(out, "{}", printable(&self.sentence))?;
+        if self.errors + self.warnings > 0 {
+            writeln!(out, "  {} and {}", counted(self.errors, "error"), counted(self.warnings, "warning"))?;
         }
         for (number, finding) in self.first.iter().enumerate() {
             write!(out, "  {}. {}", number + 1, printable(&finding.title))?;
@@ -117,18 +179,22 @@ mod tests {
             finding(Severity::Warning, Area::Time, "delay"),
         ];
         let verdict = Verdict::of(&findings);
-        assert_eq!(verdict.usability, Usability::UsableWithCare);
+        assert_eq!(verdict.trust, Trust::Doubtful);
         let titles = |verdict: &Verdict| verdict.first.iter().map(|it| it.title.clone()).collect::<Vec<_>>();
         assert_eq!(titles(&verdict), ["delay", "blur", "noise"]);
         findings.push(finding(Severity::Error, Area::Encoders, "joint"));
         let verdict = Verdict::of(&findings);
-        assert_eq!(verdict.usability, Usability::NotUsable);
+        assert_eq!(verdict.trust, Trust::NotUsable);
         assert_eq!(titles(&verdict), ["joint", "delay", "blur"]);
         let text = verdict.to_string();
         assert!(
-            text.starts_with("not usable as it is: 1 error and 3 warnings\n  1. joint\n     → mend joint\n"),
+            text.starts_with("✖ Not usable: joint\n  1 error and 3 warnings\n  1. joint\n     → mend joint\n"),
             "{text}"
         );
-        assert_eq!(Verdict::of(&findings[..1]).to_string(), "usable: no errors and no warnings\n");
+        assert_eq!(Verdict::of(&findings[..1]).to_string(), "✔ No fault found in the log and its rig\n");
+        // An assumed value alone is no reason to doubt.
+        assert_eq!(Verdict::of(&findings[2..3]).trust, Trust::Trusted);
+        let either = ["most likely A", "most likely B"].map(|title| finding(Severity::Error, Area::Imu, title));
+        assert_eq!(Verdict::of(&either).sentence, "✖ Not usable: most likely A, or B");
     }
 }
