@@ -16,6 +16,7 @@ mod export;
 mod figure_arguments;
 mod generate;
 mod interrupt;
+mod log_checking;
 mod noise;
 #[cfg(feature = "gui")]
 mod open_log;

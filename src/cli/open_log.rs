@@ -41,7 +41,8 @@ pub(crate) fn open_log(
                 progress(OpenProgress { text: stage_text(stage, of), ratio })
             });
         let saved = saved.map_err(|error| failure(&error))?;
-        let session = open_session(&saved, &sources.main).map_err(|error| problem(error.to_string()))?;
+        let mut session = open_session(&saved, &sources.main).map_err(|error| problem(error.to_string()))?;
+        session.check_in_background().map_err(|error| problem(error.to_string()))?;
         return Ok(OpenedLog { log: Box::new(session), remembered: sources.main, notices: Vec::new() });
     }
     let sources = LogSources { rig: request.rig.clone().or(sources.rig), ..sources };
@@ -63,7 +64,12 @@ pub(crate) fn open_log(
         // The conversion of a video writes a rig whose values are assumed; they are shown before they are used.
         return Err(rig_question(request, &sources, &prepared, &of_recording, &limits));
     }
-    match SessionPlan::open(&session_request).and_then(Session::start) {
+    let started = SessionPlan::open(&session_request).and_then(|plan| {
+        let mut session = Session::start(plan)?;
+        session.check_in_background()?;
+        Ok(session)
+    });
+    match started {
         Ok(session) => {
             let remembered =
                 if sources.splits.is_empty() && sources.autopilot.is_none() { sources.main } else { prepared.log };

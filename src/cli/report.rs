@@ -5,9 +5,8 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use clap::Args;
 use dcvins::export;
-use dcvins::log_check::{self, CheckReport};
 use dcvins::report::{ReportFigure, ReportOptions, write_known_report, write_report};
-use dcvins::session::{Computation, SessionPlan, image_rotations};
+use dcvins::session::{Computation, SessionPlan};
 #[cfg(feature = "gui")]
 use dcvins::sweep::{OpenedStudy, is_study};
 use dcvins::text::{command_line, log_name};
@@ -16,6 +15,7 @@ use crate::cli::compute::compute;
 use crate::cli::estimation_arguments::EstimationArguments;
 use crate::cli::exit::ExitOutcome;
 use crate::cli::interrupt::Interrupt;
+use crate::cli::log_checking::beside_check;
 use crate::cli::prepared_log::prepared_log;
 #[cfg(feature = "gui")]
 use crate::cli::report_figures;
@@ -26,7 +26,7 @@ use crate::cli::shared_arguments::seconds;
 use crate::cli::study_arguments::StudyArguments;
 #[cfg(feature = "gui")]
 use crate::cli::study_report::study_report;
-use crate::cli::terminal::{Progress, notify, print};
+use crate::cli::terminal::{notify, print};
 
 #[derive(Args, Clone, Debug)]
 pub(crate) struct ReportArguments {
@@ -92,6 +92,7 @@ pub(crate) fn report(arguments: &ReportArguments) -> Result<ExitOutcome> {
         inputs: arguments.estimation.input_files(&arguments.log),
         figures,
     };
+    computation.set_check(options.check.iter().flat_map(|check| check.findings.clone()).collect());
     let recording = computation.recording();
     let written = write_report(recording, &arguments.output, &options)?;
     print(&format!("{}\n", page_of(arguments).display()))?;
@@ -143,19 +144,6 @@ pub(crate) fn own_command_line() -> String {
         *program = Path::new(program).file_name().unwrap_or_default().to_string_lossy().into_owned();
     }
     command_line(words)
-}
-
-/// Runs `work` while another thread checks the log and its rig.
-fn beside_check<T>(plan: &SessionPlan, work: impl FnOnce() -> Result<T>) -> (Result<T>, CheckReport) {
-    std::thread::scope(|scope| {
-        let checking = scope.spawn(|| {
-            let rotations = image_rotations(&plan.log, &plan.rig);
-            log_check::check(&plan.log, Ok(&plan.rig), &rotations)
-        });
-        let done = work();
-        let _progress = Progress::spinner("checking the log");
-        (done, checking.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
-    })
 }
 
 #[cfg(feature = "gui")]

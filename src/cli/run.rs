@@ -1,6 +1,7 @@
 //! `dcvins run`: the estimator on a log without a window.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use anyhow::{Result, bail};
 use clap::Args;
@@ -14,6 +15,7 @@ use crate::cli::compute::{compute, compute_until};
 use crate::cli::estimation_arguments::EstimationArguments;
 use crate::cli::exit::ExitOutcome;
 use crate::cli::interrupt::Interrupt;
+use crate::cli::log_checking::beside_check;
 use crate::cli::prepared_log::prepared_log;
 use crate::cli::run_summary::{describe, describe_trajectory};
 use crate::cli::terminal::{notify, print, print_json};
@@ -69,10 +71,12 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitOutcome> {
     let needs_whole_steps = arguments.mcap || arguments.break_at.is_some();
     let memory_budget_bytes = if needs_whole_steps { plan.memory_budget_bytes } else { SUMMARY_BUDGET_BYTES };
     let plan = SessionPlan { interrupted: interrupt.flag(), memory_budget_bytes, ..plan.clone() };
-    let (recording, hit) = match &arguments.break_at {
-        Some(condition) => compute_until(&plan, condition)?,
-        None => (compute(&plan, None)?.into_recording(), None),
-    };
+    let (computed, checked) = beside_check(&plan, || match &arguments.break_at {
+        Some(condition) => compute_until(&plan, condition),
+        None => Ok((compute(&plan, None)?.into_recording(), None)),
+    });
+    let (mut recording, hit) = computed?;
+    recording.check = Some(Arc::new(checked.findings));
     let no_steps = recording.runs.iter().all(|run| run.steps.is_empty());
     if interrupt.is_set() && no_steps {
         notify("dcvins: interrupted before the first step; nothing is written");

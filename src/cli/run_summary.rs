@@ -4,7 +4,7 @@ use std::path::Path;
 
 use dcvins::observability::{Determination, MIN_SPURIOUS_GAIN};
 use dcvins::session::{FlightParameter, KnownLossSummary, RunSummary, TrajectoryLane, least_determined};
-use dcvins::text::Named as _;
+use dcvins::text::{Named as _, printable};
 
 /// Text of a trajectory of another program for the terminal.
 pub(crate) fn describe_trajectory(lane: &TrajectoryLane) -> String {
@@ -20,7 +20,14 @@ pub(crate) fn describe_trajectory(lane: &TrajectoryLane) -> String {
 /// Text of a run's summary for the terminal.
 pub(crate) fn describe(folder: &Path, summary: &RunSummary) -> String {
     let frames = &summary.frames;
-    let mut lines = vec![format!("{} on {} ({})\n", summary.run, summary.log, summary.camera)];
+    let answer = &summary.answer;
+    let mut lines = vec![
+        format!("{}\n", printable(&answer.sentence)),
+        format!("{} on {} ({})\n", summary.run, summary.log, summary.camera),
+    ];
+    if !answer.remedy.is_empty() {
+        lines.insert(1, format!("  → {}\n", printable(&answer.remedy)));
+    }
     let start = frames
         .initialized_at_s
         .map_or_else(|| "never initialized".to_owned(), |time_s| format!("initialized at {time_s:.2} s"));

@@ -26,6 +26,7 @@ use crate::cli::estimation_arguments::EstimationArguments;
 use crate::cli::exit::ExitOutcome;
 use crate::cli::figure_arguments::FigureArguments;
 use crate::cli::interrupt::Interrupt;
+use crate::cli::log_checking::beside_check;
 use crate::cli::prepared_log::{prepared_log, prepared_session};
 use crate::cli::report::own_command_line;
 use crate::cli::result_cache::{CacheArguments, CachedResult};
@@ -211,7 +212,7 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<ExitOutcome>
         }
         return Ok(ExitOutcome::Success);
     }
-    let mut computation = shown.compute(instants.last_ns, &interrupt)?;
+    let mut computation = shown.compute(instants.last_ns, &interrupt, arguments.panel == "all")?;
     if interrupt.is_set() {
         return stopped(0);
     }
@@ -453,15 +454,25 @@ impl Shown {
         )
     }
 
-    /// Computes the runs up to a stamp; runs of a saved session are computed to their end.
-    fn compute(&mut self, until_ns: i64, interrupt: &Interrupt) -> Result<Computation> {
+    /// Computes the runs up to a stamp; runs of a saved session are computed to their end. For the whole window, the log is
+    /// checked as well.
+    fn compute(&mut self, until_ns: i64, interrupt: &Interrupt, with_check: bool) -> Result<Computation> {
         match &mut self.source {
             Source::Log(plan, _) => {
                 plan.interrupted = interrupt.flag();
-                compute(plan, Some(until_ns))
+                if !with_check {
+                    return compute(plan, Some(until_ns));
+                }
+                let (computed, checked) = beside_check(plan, || compute(plan, Some(until_ns)));
+                let mut computation = computed?;
+                computation.set_check(checked.findings);
+                Ok(computation)
             }
             Source::Saved(session) => {
                 session.finish();
+                if with_check {
+                    session.check_log();
+                }
                 session.take_notices().iter().for_each(|notice| notify(&format!("dcvins: {notice}")));
                 Ok(session.computation())
             }

@@ -13,6 +13,9 @@ pub(super) fn page(content: &ReportContent, figures: &[ReportFigure]) -> String 
     let title = format!("Flight report: {}", content.log);
     let body = html! {
         h1 { (title) }
+        @for run in &content.runs {
+            (answer(content, run))
+        }
         p.lead { (lead(content)) }
         (contents(content))
         (verdict_section(content))
@@ -52,6 +55,18 @@ pub(super) fn page(content: &ReportContent, figures: &[ReportFigure]) -> String 
         }
     };
     format!("{}\n", document(&title, &body))
+}
+
+/// Answer of a run: trust, cause and required accuracy in one sentence, and what to do first.
+fn answer(content: &ReportContent, run: &RunContent) -> Markup {
+    let found = &run.summary.answer;
+    html! {
+        p.answer {
+            @if content.runs.len() > 1 { (run.label) ": " }
+            strong { (found.sentence) }
+            @if !found.remedy.is_empty() { br; "→ " (found.remedy) }
+        }
+    }
 }
 
 fn has_log_section(content: &ReportContent) -> bool {

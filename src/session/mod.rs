@@ -8,7 +8,9 @@
 //! - [`accuracy`]: trajectory errors against ground truth.
 //! - [`antenna`]: the same against positions of an antenna, with its lever arm.
 //! - `plan/`: the definition of a session: log, rig, runs, and the changes of a fork.
+//! - `misfit/`: residuals of a run by sensor, and whether they agree with their noise.
 //! - `record/`: the reports of every step as plain data; no threads, and nothing that runs an estimator.
+//! - `result/`: the result of a run: its numbers, whether it can be trusted, and the required accuracy.
 //! - [`breakpoints`]: conditions on those reports.
 //! - `engine/`: runs on threads, and recomputation of their steps from step inputs and estimator snapshots. Messages of
 //!   the threads become records in [`Computation`], nowhere else.
@@ -21,20 +23,21 @@ pub mod antenna;
 pub mod breakpoints;
 mod diagnosis;
 mod engine;
+mod misfit;
 mod plan;
 mod playback;
 mod record;
+mod result;
 #[cfg(test)]
 pub(crate) mod tests;
 
-pub use diagnosis::{
-    AgreementValue, Diagnosis, DiagnosisVerdict, LogFaults, RankedCause, TruthAgreement, WaitingReason, diagnose,
-};
+pub use diagnosis::{Diagnosis, DiagnosisVerdict, LogFaults, RankedCause, WaitingReason, diagnose};
 pub use engine::{
     BreakpointHit, CalibrationErrors, CalibrationRequest, CalibrationRun, CalibrationRunError, Computation,
     FlightNoiseError, SnapshotUse, Stopwatch, calibrate, camera_rotations, compute, compute_until, fit_flight_noise,
     image_rotations, situation_before_flight,
 };
+pub use misfit::AgreementValue;
 pub use plan::{
     DEFAULT_MEMORY_BUDGET_BYTES, EstimatorTuning, FORK_PARAMETERIZATIONS, FlightPrior, FlightSigmas, ForkChanges,
     ForkError, LoadedPositions, LoadedTrajectory, MAX_RUNS, MAX_TRAJECTORIES, ParameterizationChoice, RunSpec,
@@ -47,9 +50,12 @@ pub use playback::{
 pub use record::{
     CalibrationRow, CollectedInformation, ComparedQuantity, Comparison, Divergence, FlightParameter, FlightVerdicts,
     ForkOrigin, ImageResiduals, KnownLossSummary, LostSince, MeanResidual, ParameterSummary, PassProgress,
-    PoseConsistency, PoseError, PositionTruth, RELATIVE_LENGTHS_M, RankColumn, RankSummary, Recording,
-    RelativeAccuracy, ResidualSum, RunMemory, RunRecord, RunSummary, RunWarning, SolverPosition, SolverTrace,
-    StageSummary, StepColumn, StepFactorRows, StepRecord, TimingSummary, TrajectoryAccuracy, TrajectoryEvaluation,
-    TrajectoryLane, WarningLine, evaluate_trajectory, flight_advice, flight_headline, flight_table, least_determined,
-    log_warning_lines, run_warning_lines, summarize, warning_lines,
+    PoseConsistency, PoseError, PositionTruth, RELATIVE_LENGTHS_M, RankColumn, Recording, RelativeAccuracy,
+    ResidualSum, RunMemory, RunRecord, RunWarning, SolverPosition, SolverTrace, StepColumn, StepFactorRows, StepRecord,
+    TrajectoryAccuracy, TrajectoryEvaluation, TrajectoryLane, WarningLine, evaluate_trajectory, flight_advice,
+    flight_headline, flight_table, least_determined, log_warning_lines, run_warning_lines, warning_lines,
+};
+pub use result::{
+    Answer, FindingSource, RankSummary, Requirement, RunFinding, RunSummary, StageSummary, TimingSummary,
+    TruthAgreement, summarize,
 };

@@ -75,8 +75,10 @@ const MUST_NOT_IMPORT: &[(&str, &[&str])] = &[
     // Runs no estimator.
     ("log_check", &["estimator", "observability", "calibration", "simulation"]),
     ("session/plan", &["session/record", "session/engine", "session/diagnosis", "session/playback"]),
+    ("session/misfit", &["session/record", "session/engine", "session/diagnosis", "session/playback"]),
     // No thread and no estimator.
     ("session/record", &["session/engine", "session/diagnosis", "session/playback", "estimator/estimator"]),
+    ("session/result", &["session/engine", "session/diagnosis", "session/playback", "estimator/estimator"]),
     ("session/engine", &["session/diagnosis", "session/playback"]),
     ("session/diagnosis", &["session/playback"]),
     ("session/breakpoints", &["session/engine", "session/diagnosis", "session/playback"]),

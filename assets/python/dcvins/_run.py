@@ -41,6 +41,11 @@ class Run:
         return int(self.summary["frames"]["estimated"]) > 0
 
     @property
+    def answer(self) -> str:
+        """Whether the results can be trusted, the cause if not, and the required accuracy, in one sentence."""
+        return str(self.summary["answer"]["sentence"])
+
+    @property
     def ate_rmse_m(self) -> Optional[float]:
         """RMS of the absolute trajectory error in metres, `None` without a ground truth or before initialization."""
         accuracy = self.summary["accuracy"]

@@ -121,6 +121,7 @@ fn recording_of(flight: &SyntheticFlight, runs: &[&str]) -> Recording {
         truth_is_batch: false,
         position_truth: None,
         trajectories: Vec::new(),
+        check: None,
         warnings: vec![LogWarning::new(
             WarningKind::ImuGap,
             "/imu",

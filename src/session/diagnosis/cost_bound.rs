@@ -1,6 +1,6 @@
 //! Bound on the cost of a trial part of the way: a correction that explains less than another by then is not computed on.
 
-use super::misfit::{Misfit, Scale, StepMisfit};
+use crate::session::misfit::{Misfit, Scale, StepMisfit};
 use crate::session::plan::ForkChanges;
 
 /// Ratio of the steps of a span after which trials are compared with the run itself.

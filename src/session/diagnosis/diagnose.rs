@@ -14,28 +14,28 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use rayon::prelude::*;
 
-use super::agreement::{self, AgreementValue};
 use super::axes::plausible_axes;
 use super::cost_bound::CostBound;
 use super::hypotheses::{TrialHypothesis, changes_at, first_hypotheses};
 use super::measured::{LogFaults, Undoing};
-use super::misfit::Misfit;
-use super::outcome::{Diagnosis, DiagnosisVerdict, RankedCause, TruthAgreement, WaitingReason};
+use super::outcome::{Diagnosis, DiagnosisVerdict, RankedCause, WaitingReason};
 use super::ranking::{RankedTrial, by_cause, decide};
 use super::refinement::refined;
 use super::scoring::{LOST, Trials, scored};
 use super::span::{confirmed_span, screened_span};
 use super::statement::texts;
 use super::trial::{DiagnosedRun, TrialResult, TrialSpan};
-use super::truth;
 use super::tuning::{moved, tuned};
 use crate::faults::{Explanation as _, FaultKind};
 use crate::geometry::seconds_from_ns;
 use crate::log_check::Finding;
 use crate::sensors::Rig;
 use crate::session::engine::{Computation, History};
+use crate::session::misfit::Misfit;
+use crate::session::misfit::agreement::{self, AgreementValue};
 use crate::session::plan::ForkChanges;
 use crate::session::record::RunRecord;
+use crate::session::result::{TruthAgreement, truth};
 
 /// Causes that are computed again on more of the run.
 const CONFIRMED: usize = 6;

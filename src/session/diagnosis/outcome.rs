@@ -4,10 +4,11 @@ use std::fmt;
 
 use serde::{Serialize, Serializer};
 
-use super::agreement::AgreementValue;
 use crate::faults::{FaultKind, Severity};
 use crate::log_check::Finding;
+use crate::session::misfit::AgreementValue;
 use crate::session::plan::ForkChanges;
+use crate::session::result::TruthAgreement;
 use crate::text::Named as _;
 
 /// Conclusion of a diagnosis.
@@ -60,15 +61,6 @@ fn key<S: Serializer>(cause: &FaultKind, serializer: S) -> Result<S::Ok, S::Erro
 
 fn text<S: Serializer>(changes: &ForkChanges, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_str(changes)
-}
-
-/// Errors against ground truth.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct TruthAgreement {
-    /// Root mean square of the position error after alignment.
-    pub ate_m: f64,
-    /// Mean normalized error squared of the poses, 6 for consistent covariances.
-    pub nees: Option<f64>,
 }
 
 /// A reason for which attempts to initialize waited.
@@ -215,13 +207,6 @@ impl RankedCause {
         let wrong: Vec<String> = self.values.iter().filter(|value| !value.agrees()).map(described).collect();
         let left = if wrong.is_empty() { "residuals agree".to_owned() } else { format!("left: {}", wrong.join(", ")) };
         self.accuracy.map_or_else(|| left.clone(), |accuracy| format!("{left}; {}", accuracy.text()))
-    }
-}
-
-impl TruthAgreement {
-    fn text(&self) -> String {
-        let nees = self.nees.map_or_else(String::new, |nees| format!(", NEES {nees:.1} (6 is consistent)"));
-        format!("ATE {:.3} m{nees}", self.ate_m)
     }
 }
 

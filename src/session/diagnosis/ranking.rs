@@ -4,12 +4,12 @@
 //! noise lowers every χ²; its score has the logarithm of the density in addition, `2·ln(factor)` for each row. A half of the
 //! image that is not used is compared on the other half.
 
-use super::agreement::disagreement;
 use super::hypotheses::TrialHypothesis;
-use super::misfit::{Misfit, Scale};
 use super::outcome::DiagnosisVerdict;
 use super::trial::TrialResult;
 use crate::faults::{Choice, Explanation, Fault, FaultKind, MOST_REMAINING, criterion};
+use crate::session::misfit::agreement::disagreement;
+use crate::session::misfit::{Misfit, Scale};
 
 /// Trial of a hypothesis with its averages over the scored steps.
 #[derive(Clone, Debug)]
@@ -101,8 +101,8 @@ pub(super) fn decide(given: &RankedTrial, ranked: &[RankedTrial]) -> (DiagnosisV
 
 #[cfg(test)]
 mod tests {
-    use super::super::misfit::StepMisfit;
     use super::*;
+    use crate::session::misfit::StepMisfit;
     use crate::session::plan::ForkChanges;
 
     const SCALE: Scale = Scale { sigma_px: 0.1, observations: 800.0, frames: 11.0, rows: [0.0; 3], windows: 4.0 };

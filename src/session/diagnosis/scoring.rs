@@ -1,10 +1,10 @@
 //! Trials of one span on one scale.
 
 use super::hypotheses::TrialHypothesis;
-use super::misfit::{Misfit, Scale};
 use super::ranking::{RankedTrial, score};
 use super::trial::TrialResult;
 use crate::faults::FaultKind;
+use crate::session::misfit::{Misfit, Scale};
 use crate::session::plan::ForkChanges;
 
 /// Ratio of the steps with a window below which a run is lost.

@@ -6,12 +6,12 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::cost_bound::CostBound;
-use super::misfit::StepMisfit;
 use crate::estimator::StepReport;
 use crate::faults::FaultKind;
 use crate::gimbal::{ClassicalChain, ParameterId};
 use crate::sensors::Rig;
 use crate::session::engine::{OwnedStepInput, RunEngine, apply_fork, guarded};
+use crate::session::misfit::StepMisfit;
 use crate::session::plan::{ForkChanges, RunSpec};
 use crate::session::record::RunRecord;
 
@@ -111,7 +111,7 @@ impl DiagnosedRun<'_> {
             let scale = if number >= change_at { pixel_scale(changes) } else { 1.0 };
             result.take(
                 number,
-                StepMisfit::of(&report, input.main_tracks().statistics.tracked, scale, self.resolution_px()),
+                StepMisfit::of(&report, input.main_tracks().statistics.tracked, scale, Some(self.resolution_px())),
                 &report,
             );
             on_report(report, input);

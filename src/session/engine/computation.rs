@@ -7,6 +7,7 @@ use super::history::{History, SnapshotUse};
 use super::recompute::{Detail, RecomputeRequest, Recomputed};
 use crate::estimator::CalibrationPosterior;
 use crate::flight_log::LogWarning;
+use crate::log_check::Finding;
 use crate::session::plan::SessionPlan;
 use crate::session::record::{
     PassProgress, Recording, RunRecord, SolverPosition, SolverTrace, StepFactorRows, StepRecord,
@@ -65,6 +66,11 @@ impl Computation {
         if let Some(run) = self.recording_mut().runs.pop() {
             self.histories.remove(&run.id);
         }
+    }
+
+    /// Stores the findings of the check of the log and its rig, on which the answers of the runs depend.
+    pub fn set_check(&mut self, findings: Vec<Finding>) {
+        self.recording_mut().check = Some(Arc::new(findings));
     }
 
     /// Stores a message of the engine in the record.

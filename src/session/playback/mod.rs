@@ -1,5 +1,6 @@
 //! A cursor over the record, the commands that move it, and the session that connects cursor, engine and record.
 
+mod background_check;
 mod background_diagnosis;
 mod background_images;
 mod command;

@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use super::background_check::BackgroundCheck;
 use super::background_diagnosis::{BackgroundDiagnosis, DiagnosisProgress};
 use super::background_images::{BackgroundImages, FrameImage};
 use super::command::{Command, PlaybackSpeed};
@@ -12,8 +13,9 @@ use super::saved::PendingRestore;
 use super::shared::{SharedComputation, Wake};
 use crate::flight_log::ImageReader;
 use crate::geometry::ns_from_seconds;
+use crate::log_check;
 use crate::session::breakpoints::{Breakpoints, Condition};
-use crate::session::engine::{Computation, Engine, RecomputeThread};
+use crate::session::engine::{Computation, Engine, RecomputeThread, image_rotations};
 use crate::session::plan::{SessionError, SessionPlan, SessionRequest};
 use crate::session::record::{Recording, SolverPosition};
 
@@ -46,6 +48,7 @@ pub struct Session {
     pub(super) notices: Vec<String>,
     images: BackgroundImages,
     diagnosis: Option<BackgroundDiagnosis>,
+    check: Option<BackgroundCheck>,
 }
 
 impl Session {
@@ -75,7 +78,26 @@ impl Session {
             notices: Vec::new(),
             images,
             diagnosis: None,
+            check: None,
         })
+    }
+
+    /// Checks the log and its rig on a thread of its own, after the first step; the findings appear in the record.
+    ///
+    /// # Errors
+    /// If no thread can be started.
+    pub fn check_in_background(&mut self) -> Result<(), SessionError> {
+        let (has_begun, store) = self.shared.receiver_of_check();
+        let (log, rig) = (Arc::clone(&self.plan.log), Arc::clone(&self.plan.rig));
+        self.check = Some(BackgroundCheck::start(log, rig, has_begun, store)?);
+        Ok(())
+    }
+
+    /// Checks the log and its rig; returns when the findings are in the record.
+    pub fn check_log(&mut self) {
+        let rotations = image_rotations(&self.plan.log, &self.plan.rig);
+        let checked = log_check::check(&self.plan.log, Ok(&self.plan.rig), &rotations);
+        self.shared.change(|computation| computation.set_check(checked.findings));
     }
 
     /// The reports so far; a cheap copy.

@@ -8,6 +8,7 @@ use std::thread::{Builder, JoinHandle};
 
 use parking_lot::Mutex;
 
+use crate::log_check::Finding;
 use crate::session::engine::{Computation, EngineMessage, RecomputeRequest, Recomputed};
 use crate::session::plan::SessionError;
 use crate::session::record::Recording;
@@ -70,6 +71,21 @@ impl SharedComputation {
                 wake();
             }
         }
+    }
+
+    /// Function that stores the findings of the check, and one that is true once a run has a step.
+    pub(super) fn receiver_of_check(
+        &self,
+    ) -> (impl Fn() -> bool + Send + 'static, impl FnOnce(Vec<Finding>) + Send + 'static) {
+        let (state, known) = (Arc::clone(&self.state), Arc::clone(&self.state));
+        let has_begun = move || known.computation.lock().recording().runs.iter().any(|run| !run.steps.is_empty());
+        let store = move |findings| {
+            state.change(|computation| computation.set_check(findings));
+            if let Some(wake) = state.wake.lock().as_ref() {
+                wake();
+            }
+        };
+        (has_begun, store)
     }
 
     /// Sets the function that is called when a step at the cursor has been recomputed.

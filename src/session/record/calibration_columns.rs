@@ -1,7 +1,6 @@
 //! Columns of the calibration table: in files, on the screen and in reports.
 
-use super::flight_parameter::FlightParameter;
-use super::run_summary::ParameterSummary;
+use super::flight_parameter::{FlightParameter, ParameterSummary};
 use crate::geometry::Dimension;
 use crate::observability::Determination;
 use crate::table::{Column, Medium, Shown, Style, Tone};

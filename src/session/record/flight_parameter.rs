@@ -37,6 +37,27 @@ pub struct FlightParameter {
     pub remedy: String,
 }
 
+/// One calibration parameter, initial and final.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ParameterSummary {
+    /// Name, with the names of joints.
+    pub name: String,
+    /// Serialized as its unit.
+    #[serde(rename = "unit")]
+    pub dimension: Dimension,
+    /// Value in the rig.
+    pub initial: f64,
+    /// Final value of the run.
+    #[serde(rename = "final")]
+    pub last: f64,
+    pub sigma: Option<f64>,
+    #[serde(rename = "truth", skip_serializing_if = "Option::is_none")]
+    pub ground_truth: Option<f64>,
+    /// Final minus ground-truth value.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error: Option<f64>,
+}
+
 #[expect(clippy::ref_option, reason = "the signature that serde calls")]
 fn seconds<S: Serializer>(stamp_ns: &Option<i64>, serializer: S) -> Result<S::Ok, S::Error> {
     stamp_ns.map(seconds_from_ns).serialize(serializer)

@@ -29,7 +29,7 @@ pub struct KnownLossSummary {
 }
 
 /// Known losses of a run in the order of their first step.
-pub(super) fn known_losses(run: &RunRecord, names: &ParameterNames) -> Vec<KnownLossSummary> {
+pub(in crate::session) fn known_losses(run: &RunRecord, names: &ParameterNames) -> Vec<KnownLossSummary> {
     let mut found: Vec<(KnownLoss, KnownLossSummary)> = Vec::new();
     for rank in run.steps.iter().filter_map(|step| step.rank.as_ref()) {
         for known in &rank.known {

@@ -8,6 +8,7 @@ use super::trajectory_lane::TrajectoryLane;
 use crate::flight_log::{LogWarning, WarningKind};
 use crate::geometry::ns_from_seconds;
 use crate::gimbal::ParameterId;
+use crate::log_check::Finding;
 use crate::sensors::Rig;
 use crate::session::plan::{FlightPrior, LoadedTrajectory, RunSpec, SessionPlan, chain_parameters};
 
@@ -34,6 +35,8 @@ pub struct Recording {
     pub position_truth: Option<Arc<PositionTruth>>,
     /// Trajectories of other programs, shown with the runs.
     pub trajectories: Vec<Arc<TrajectoryLane>>,
+    /// Findings of the check of the log and its rig, most severe first; `None` as long as they are not known.
+    pub check: Option<Arc<Vec<Finding>>>,
     /// Warnings about the log so far, in time order.
     pub warnings: Vec<LogWarning>,
     pub memory_budget_bytes: usize,
@@ -96,6 +99,7 @@ impl Recording {
             truth_is_batch: plan.truth_is_batch,
             position_truth: position_truth.clone(),
             trajectories: plan.trajectories.iter().map(|loaded| Arc::new(lane(loaded))).collect(),
+            check: None,
             warnings: Vec::new(),
             memory_budget_bytes: plan.memory_budget_bytes,
         };

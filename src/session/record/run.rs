@@ -9,9 +9,10 @@ use super::image_residuals::ImageResiduals;
 use super::solver_trace::SolverTrace;
 use super::step::{RunWarning, StepFactorRows, StepRecord, add_warnings, warnings_of};
 use super::summary::SummaryOrder;
-use crate::estimator::CalibrationPosterior;
+use crate::estimator::{CalibrationPosterior, EventKind};
 use crate::geometry::RigidTransform;
 use crate::session::accuracy::{AlignmentSums, TrajectoryAlignment};
+use crate::session::misfit::StepMisfit;
 use crate::session::plan::{ForkChanges, RunSpec};
 
 /// Maximum number of recomputed complete steps of a run.
@@ -78,6 +79,8 @@ pub struct RunRecord {
     pub position_truth: Option<Arc<PositionTruth>>,
     /// Pairs of run poses and these positions, with their alignment.
     pub(super) antenna: AntennaRecord,
+    /// Residuals of each step by sensor.
+    pub(in crate::session) misfits: Vec<StepMisfit>,
     /// Residuals of every image in the step of that image, by place in the image.
     pub image_residuals: ImageResiduals,
     /// Warnings of its steps, each message once.
@@ -112,6 +115,7 @@ impl RunRecord {
             alignment_sums: AlignmentSums::default(),
             position_truth: None,
             antenna: AntennaRecord::default(),
+            misfits: Vec::new(),
             image_residuals: ImageResiduals::default(),
             warnings: Vec::new(),
             memory: RunMemory::default(),
@@ -145,6 +149,7 @@ impl RunRecord {
         // The parent counts the bytes of the shared steps; tracks are counted once for all runs.
         fork.memory.tracks = fork.steps.iter().map(|step| step.tracks_bytes()).sum();
         fork.warnings = warnings_of(&fork.steps);
+        fork.misfits = parent.misfits.get(..step).unwrap_or_default().to_vec();
         // Of steps that are kept as summaries the residuals are not known any more.
         fork.image_residuals = ImageResiduals::of_steps(fork.steps.iter().map(Arc::as_ref));
         fork.align();
@@ -165,8 +170,26 @@ impl RunRecord {
         self.memory.steps += record.own_bytes();
         self.memory.tracks += record.tracks_bytes();
         add_warnings(&mut self.warnings, &record.report);
+        self.misfits.push(StepMisfit::of(&record.report, record.tracks.statistics.tracked, 1.0, None));
         self.image_residuals.add_step(&record.report);
         self.steps.push(Arc::new(record));
+    }
+
+    /// Reasons for which attempts to initialize waited, each with its number of images, the most frequent first. A reason
+    /// is its last message.
+    pub(in crate::session) fn waiting_reasons(&self) -> Vec<(String, usize)> {
+        let mut reasons: Vec<(&str, usize)> = Vec::new();
+        let events = self.steps.iter().flat_map(|step| &step.report.events);
+        for event in events.filter(|event| event.kind == EventKind::InitializationWaits) {
+            let subject = |message: &str| message.split(':').next().map(str::to_owned);
+            let message = event.message.as_str();
+            match reasons.iter_mut().find(|(known, _)| subject(known) == subject(message)) {
+                Some((known, count)) => (*known, *count) = (message, *count + 1),
+                None => reasons.push((message, 1)),
+            }
+        }
+        reasons.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
+        reasons.into_iter().map(|(message, count)| (message.to_owned(), count)).collect()
     }
 
     /// Removes the steps after a stamp.
@@ -180,6 +203,7 @@ impl RunRecord {
         self.memory.steps -= back(StepRecord::own_bytes);
         self.memory.tracks -= back(StepRecord::tracks_bytes);
         self.finished = true;
+        self.misfits.truncate(count);
         self.warnings = warnings_of(&self.steps);
         self.image_residuals = ImageResiduals::of_steps(self.steps.iter().map(Arc::as_ref));
         self.align();

@@ -1,4 +1,5 @@
 mod accuracy;
+mod answer;
 mod covariance;
 mod diagnosis;
 mod flight_prior;

@@ -1,0 +1,403 @@
+//! The answer of a run in one sentence: trust in its results, the cause of a doubt, and the required accuracy.
+//!
+//! It is made in one place from what the check of the log measured, from the run's residuals and from its calibration.
+//! Window, command line, report and files begin with it.
+
+use serde::{Serialize, Serializer};
+
+use super::truth;
+use crate::faults::{Area, Fault, FaultKind, LONGEST_SHIFT_S, Sensor};
+use crate::geometry::{Dimension, ns_from_seconds, seconds_from_ns};
+use crate::log_check::{Finding, Trust, joint_statement};
+use crate::observability::Determination;
+use crate::sensors::Rig;
+use crate::session::misfit::agreement::{self, AgreementValue};
+use crate::session::misfit::{Misfit, StepMisfit};
+use crate::session::plan::ForkChanges;
+use crate::session::record::{Recording, RunRecord, StepRecord};
+use crate::table::Shown;
+
+/// Fewest steps with a window from which the residuals of a run are judged: the first windows settle.
+const JUDGED_STEPS: usize = 40;
+/// Ratio of a mean residual to its limit from which results are useless: the error is then several times the noise.
+const USELESS_RATIO: f64 = 4.0;
+
+/// Source of a finding about a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FindingSource {
+    /// The check of the log and its rig.
+    Check,
+    /// Measurements that the rig names and the log lacks.
+    Streams,
+    Initialization,
+    /// Residuals that disagree with their noise.
+    Residuals,
+    GroundTruth,
+}
+
+/// Reason why results of a run are doubtful or useless.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RunFinding {
+    pub trust: Trust,
+    pub source: FindingSource,
+    /// In one sentence.
+    pub statement: String,
+    /// Measured values with units.
+    pub evidence: String,
+    /// Instruction; empty if none is known.
+    pub remedy: String,
+    /// Stamp from which on it holds, in nanoseconds since the log began (in files seconds); `None` for the whole run.
+    #[serde(rename = "since_s", serialize_with = "seconds")]
+    pub since_ns: Option<i64>,
+    /// Finding of the check with the faults of measurements or rig.
+    #[serde(skip)]
+    pub checked: Option<Finding>,
+}
+
+impl RunFinding {
+    /// Changes of a fork that undo the fault, and the stamp of its first step in nanoseconds since the log began; `None` if
+    /// no fault is known or no constant correction undoes it.
+    pub fn correction(&self) -> Option<(ForkChanges, i64)> {
+        let [fault] = self.checked.as_ref()?.faults.as_slice() else { return None };
+        fault.kind.row().correction.as_ref()?;
+        let is_clock = matches!(fault.kind, FaultKind::CameraClock | FaultKind::EncoderClock);
+        if is_clock && fault.value(0).abs() > LONGEST_SHIFT_S {
+            return None;
+        }
+        let corrections = match fault.kind {
+            FaultKind::JointReversed | FaultKind::JointsSwapped => fault.of_single_joints(),
+            _ => vec![Fault { camera: None, since_s: None, ..fault.clone() }],
+        };
+        Some((ForkChanges { corrections, ..ForkChanges::default() }, fault.since_s.map_or(0, ns_from_seconds)))
+    }
+}
+
+#[expect(clippy::ref_option, reason = "the signature that serde calls")]
+fn seconds<S: Serializer>(stamp_ns: &Option<i64>, serializer: S) -> Result<S::Ok, S::Error> {
+    stamp_ns.map(seconds_from_ns).serialize(serializer)
+}
+
+/// Parameters of a run against the required accuracy.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Requirement {
+    /// Number of parameters whose standard deviation is at most the required one.
+    pub met: usize,
+    /// Number of estimated parameters, without those that are redundant in the parameterization.
+    pub parameters: usize,
+    /// Required accuracy in words, such as `5 mm and 0.1°`.
+    pub required: String,
+    /// Parameter with the largest ratio of σ to the required accuracy, with its σ; `None` if all meet it.
+    pub worst: Option<String>,
+    /// Time from which on all parameters meet it, in seconds since the log began.
+    pub since_s: Option<f64>,
+}
+
+/// Answer of a run.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Answer {
+    pub trust: Trust,
+    /// The answer in one sentence.
+    pub sentence: String,
+    /// What to do first; empty if nothing is known.
+    pub remedy: String,
+    /// Findings with the largest effect first.
+    pub findings: Vec<RunFinding>,
+    /// `None` for a run without estimated calibration.
+    pub requirement: Option<Requirement>,
+}
+
+impl Answer {
+    /// Answer of a run as far as it is computed; `Recording::check` has the findings of the check if they are known.
+    pub fn of_run(recording: &Recording, run: &RunRecord) -> Self {
+        let check = recording.check.as_ref().map_or(&[][..], |findings| findings.as_slice());
+        Self::of(&recording.rig, check, run)
+    }
+
+    /// The same from the findings of the check of the log.
+    pub(in crate::session) fn of(rig: &Rig, check: &[Finding], run: &RunRecord) -> Self {
+        let mut findings: Vec<RunFinding> = check_findings(rig, check, run).collect();
+        findings.extend(missing_joint_angles(rig, run));
+        findings.extend(initialization(run));
+        findings.extend(disagreement(run));
+        // A stable sort: the sources have the order of what they say about a cause.
+        findings.sort_by_key(|finding| std::cmp::Reverse(finding.trust));
+        let trust = findings.first().map_or(Trust::Trusted, |finding| finding.trust);
+        let requirement = requirement(rig, run);
+        let sentence = match (findings.first(), &requirement) {
+            (Some(first), _) => trust.sentence(first.since_ns.map(seconds_from_ns), &statement(&findings)),
+            (None, Some(requirement)) => requirement.sentence(),
+            (None, None) => fixed_sentence(run),
+        };
+        let remedy = findings.first().map_or_else(String::new, |first| first.remedy.clone());
+        Self { trust, sentence, remedy, findings, requirement }
+    }
+}
+
+/// Statement of the first finding; causes that the check finds about equally likely are one statement.
+fn statement(findings: &[RunFinding]) -> String {
+    let Some(first) = findings.first() else { return String::new() };
+    let checked: Vec<&Finding> = findings.iter().map_while(|it| it.checked.as_ref()).collect();
+    if checked.is_empty() { first.statement.clone() } else { joint_statement(&checked) }
+}
+
+/// Sentence about a trusted run without estimated parameters.
+fn fixed_sentence(run: &RunRecord) -> String {
+    let mark = Trust::Trusted.mark();
+    if run.steps.iter().any(|step| step.report.newest().is_some()) {
+        format!("{mark} Nothing speaks against the estimate; the calibration is fixed at the values of the rig")
+    } else {
+        format!("{mark} No estimate yet")
+    }
+}
+
+/// Findings of the check that concern a run and that the run does not correct.
+fn check_findings<'a>(rig: &'a Rig, check: &'a [Finding], run: &'a RunRecord) -> impl Iterator<Item = RunFinding> + 'a {
+    let relevant = check.iter().filter(|finding| concerns(finding, rig, run) && !is_undone(finding, run));
+    relevant.filter_map(|finding| {
+        let trust = Trust::after(finding);
+        (trust > Trust::Trusted).then(|| RunFinding {
+            trust: if finding.title.contains("ground truth") { Trust::Doubtful } else { trust },
+            source: FindingSource::Check,
+            statement: finding.title.clone(),
+            evidence: finding.evidence.clone(),
+            remedy: finding.remedy.clone(),
+            since_ns: finding.since_s().map(ns_from_seconds),
+            checked: Some(finding.clone()),
+        })
+    })
+}
+
+/// True unless a finding is about a camera or about joint angles that the run does not use. The title of a finding names
+/// its camera.
+fn concerns(finding: &Finding, rig: &Rig, run: &RunRecord) -> bool {
+    let uses_joints = run.spec.encoder && run.steps.last().is_none_or(|step| has_joints(step));
+    let of_joints = |kind: FaultKind| kind.row().sensor == Sensor::Joints;
+    let about_joints = match finding.faults.as_slice() {
+        [] => finding.area == Area::Encoders,
+        faults => faults.iter().all(|fault| of_joints(fault.kind)),
+    };
+    if about_joints && !uses_joints {
+        return false;
+    }
+    let names = |key: &str| {
+        finding.title.split(|letter: char| !letter.is_alphanumeric() && letter != '_').any(|word| word == key)
+    };
+    let used = cameras(run);
+    let named: Vec<&str> = rig.cameras.iter().map(|it| it.key.as_str()).filter(|key| names(key)).collect();
+    named.is_empty() || named.iter().any(|key| used.contains(key))
+}
+
+fn has_joints(step: &StepRecord) -> bool {
+    !step.report.calibration.classical.links.is_empty()
+}
+
+/// Keys of the cameras of a run, the main one first.
+fn cameras(run: &RunRecord) -> Vec<&str> {
+    let rigid = run.steps.last().into_iter().flat_map(|step| &step.report.calibration.rigid_cameras);
+    std::iter::once(run.camera_key.as_str()).chain(rigid.map(|(key, _)| key.as_str())).collect()
+}
+
+/// True if the run corrects a fault of the finding, or estimates the values that it concerns, and its residuals agree with
+/// their noise.
+fn is_undone(finding: &Finding, run: &RunRecord) -> bool {
+    let corrected = |kind: FaultKind| {
+        run.origin.as_ref().is_some_and(|origin| origin.changes.corrections.iter().any(|fault| fault.kind == kind))
+    };
+    let estimated = |kind: FaultKind| match kind {
+        FaultKind::Focal | FaultKind::PrincipalPoint | FaultKind::Intrinsics => run.spec.intrinsics,
+        FaultKind::CameraClock | FaultKind::EncoderClock | FaultKind::Clocks => run.spec.timeshift,
+        FaultKind::Shutter => run.spec.readout,
+        _ => false,
+    };
+    let is_changed = finding.faults.iter().any(|fault| corrected(fault.kind) || estimated(fault.kind));
+    is_changed && judged(run).is_some_and(|(misfit, steps)| agreement::agrees(&misfit, steps))
+}
+
+/// A rig with joints and a log without joint angles: the joints are then free unknowns.
+fn missing_joint_angles(rig: &Rig, run: &RunRecord) -> Option<RunFinding> {
+    let last = run.steps.last()?;
+    let read = |step: &StepRecord| step.report.newest().is_some_and(|newest| newest.encoder_angles_rad.is_some());
+    let estimated = run.steps.iter().filter(|step| step.report.newest().is_some()).count();
+    let has_sigma = rig.gimbal.as_ref().is_some_and(|gimbal| gimbal.encoder_sigma_rad.is_some());
+    if !run.spec.encoder || !has_sigma || !has_joints(last) || estimated < JUDGED_STEPS {
+        return None;
+    }
+    (!run.steps.iter().any(|step| read(step))).then(|| RunFinding {
+        trust: Trust::Doubtful,
+        source: FindingSource::Streams,
+        statement: "no joint angles in this log".to_owned(),
+        evidence: format!("0 of {estimated} estimated frames have joint angles; they are free unknowns"),
+        remedy: "record the joint angles, or name their topic in the rig".to_owned(),
+        since_ns: None,
+        checked: None,
+    })
+}
+
+/// A run that never initialized, or that started again.
+fn initialization(run: &RunRecord) -> Option<RunFinding> {
+    let finding = |trust, statement: String, evidence: String, remedy: &str, since_ns| RunFinding {
+        trust,
+        source: FindingSource::Initialization,
+        statement,
+        evidence,
+        remedy: remedy.to_owned(),
+        since_ns,
+        checked: None,
+    };
+    let initialized = run.steps.iter().any(|step| step.report.newest().is_some());
+    if !initialized {
+        if !run.has_ended() {
+            return None;
+        }
+        let reasons = run.waiting_reasons();
+        let statement = match reasons.first() {
+            Some((reason, images)) => {
+                format!("the run never initialized: {reason} ({images} of {} images)", run.steps.len())
+            }
+            None => "the run never initialized: no image reached the estimator".to_owned(),
+        };
+        let others: Vec<String> =
+            reasons.iter().skip(1).map(|(reason, images)| format!("{reason} ({images} images)")).collect();
+        return Some(finding(Trust::NotUsable, statement, others.join("; "), "", None));
+    }
+    let restarts = run.steps.last().map_or(0, |step| step.report.restarts);
+    let first = run.steps.iter().find(|step| step.report.restarts > 0)?;
+    let stamp_ns = first.report.stamp_ns;
+    let times = if restarts == 1 { "once".to_owned() } else { format!("{restarts} times") };
+    Some(finding(
+        Trust::Doubtful,
+        format!("the estimator failed and started again, {times}"),
+        format!("first at {:.2} s", seconds_from_ns(stamp_ns)),
+        "diagnose the run",
+        Some(stamp_ns),
+    ))
+}
+
+/// Residuals of a run over the steps that are judged; `None` while there are too few.
+fn judged(run: &RunRecord) -> Option<(Misfit, &[StepMisfit])> {
+    let initialized_ns = run.misfits.iter().find(|step| step.tracking)?.stamp_ns;
+    let misfit = Misfit::of(&run.misfits, initialized_ns);
+    (misfit.tracked >= JUDGED_STEPS).then_some((misfit, run.misfits.as_slice()))
+}
+
+/// Residuals that disagree with their noise; or, if they agree, a ground truth that does not fit.
+fn disagreement(run: &RunRecord) -> Option<RunFinding> {
+    let (misfit, steps) = judged(run)?;
+    if agreement::agrees(&misfit, steps) {
+        let text = if run.has_ended() { truth::disagreement(run) } else { None };
+        return text.map(|text| RunFinding {
+            trust: Trust::Doubtful,
+            source: FindingSource::GroundTruth,
+            statement: format!("the ground truth {text}"),
+            evidence: "the residuals agree with their noise".to_owned(),
+            remedy: "check stamps and frame of the ground truth".to_owned(),
+            since_ns: None,
+            checked: None,
+        });
+    }
+    let mut wrong: Vec<AgreementValue> = agreement::values(&misfit).into_iter().filter(|it| !it.agrees()).collect();
+    wrong.sort_by(|one, other| (other.value / other.limit).total_cmp(&(one.value / one.limit)));
+    let largest_ratio = wrong.first().map_or(0.0, |value| value.value / value.limit);
+    let statement = match wrong.first() {
+        Some(value) => format!("the residuals disagree with their noise: {}", in_words(value)),
+        None => "the residuals disagree with their noise in a part of the run".to_owned(),
+    };
+    Some(RunFinding {
+        trust: if largest_ratio > USELESS_RATIO { Trust::NotUsable } else { Trust::Doubtful },
+        source: FindingSource::Residuals,
+        statement,
+        evidence: wrong.iter().map(in_words).collect::<Vec<_>>().join("; "),
+        remedy: "diagnose the run".to_owned(),
+        since_ns: agreement::onset(steps).and_then(|step| steps.get(step)).map(|step| step.stamp_ns),
+        checked: None,
+    })
+}
+
+/// For example `reprojection residual, median in px 5.50, at most 0.5 when sound`.
+fn in_words(value: &AgreementValue) -> String {
+    if value.name.ends_with("ratio") {
+        let name = value.name.trim_end_matches(", ratio");
+        return format!("{name} {:.0} %, at most {:.0} % when sound", 100.0 * value.value, 100.0 * value.limit);
+    }
+    format!("{} {:.2}, at most {} when sound", value.name, value.value, value.limit)
+}
+
+/// Parameters of the last step against the required accuracy; `None` without estimated ones.
+fn requirement(rig: &Rig, run: &RunRecord) -> Option<Requirement> {
+    let required = &rig.required_accuracy;
+    let last = run.steps.last().filter(|_| run.spec.calibrate)?;
+    let redundant = |verdict: Determination| matches!(verdict, Determination::Redundant | Determination::Fixed);
+    let left_out: Vec<bool> = last.determinations().into_iter().map(|(_, verdict)| redundant(verdict)).collect();
+    let calibration = &last.report.calibration;
+    let names = rig.parameter_names();
+    let mut dimensions = Vec::new();
+    let (mut met, mut parameters, mut worst) = (0, 0, None);
+    for (column, parameter) in calibration.parameters.iter().enumerate() {
+        let sigma = calibration.sigmas.get(column).copied().unwrap_or(f64::NAN);
+        if left_out.get(column).copied().unwrap_or(true) || !sigma.is_finite() {
+            continue;
+        }
+        let dimension = parameter.dimension();
+        let ratio = sigma / required.of(dimension);
+        parameters += 1;
+        met += usize::from(ratio <= 1.0);
+        if !dimensions.contains(&dimension) {
+            dimensions.push(dimension);
+        }
+        if ratio > 1.0 && worst.as_ref().is_none_or(|(largest, _)| ratio > *largest) {
+            worst = Some((ratio, format!("{} ± {}", names.name(*parameter), Shown::of(dimension).sigma(sigma))));
+        }
+    }
+    dimensions.sort_by_key(|dimension| (*dimension != Dimension::Length, *dimension));
+    let texts: Vec<String> = dimensions
+        .iter()
+        .map(|dimension| {
+            let shown = Shown::of(*dimension);
+            format!("{}{}", round(required.of(*dimension) * shown.factor), shown.unit)
+        })
+        .collect();
+    let all_meet = |step: &StepRecord| {
+        let calibration = &step.report.calibration;
+        calibration.parameters.len() == left_out.len()
+            && calibration
+                .parameters
+                .iter()
+                .zip(&calibration.sigmas)
+                .zip(&left_out)
+                .all(|((parameter, sigma), left_out)| *left_out || *sigma <= required.of(parameter.dimension()))
+    };
+    let since = run.steps.iter().rev().take_while(|step| all_meet(step)).last();
+    (parameters > 0).then(|| Requirement {
+        met,
+        parameters,
+        required: and(&texts),
+        worst: worst.map(|(_, text)| text),
+        since_s: since.filter(|_| met == parameters).map(|step| seconds_from_ns(step.report.stamp_ns)),
+    })
+}
+
+impl Requirement {
+    /// For example `⚠ 6 of 18 parameters within 5 mm and 0.1°, worst pitch.a ± 7.4 mm`.
+    fn sentence(&self) -> String {
+        let Self { met, parameters, required, worst, since_s } = self;
+        let mark = if met == parameters { Trust::Trusted.mark() } else { Trust::Doubtful.mark() };
+        let worst = worst.as_ref().map_or_else(String::new, |worst| format!(", worst {worst}"));
+        let since = since_s.map_or_else(String::new, |since_s| format!(", since {since_s:.1} s"));
+        format!("{mark} {met} of {parameters} parameters within {required}{worst}{since}")
+    }
+}
+
+/// A number with at most three decimals, without zeros at its end.
+fn round(value: f64) -> f64 {
+    (value * 1e3).round() / 1e3
+}
+
+/// Words with commas and an `and` before the last.
+fn and(words: &[String]) -> String {
+    match words {
+        [] => String::new(),
+        [one] => one.clone(),
+        [most @ .., last] => format!("{} and {last}", most.join(", ")),
+    }
+}

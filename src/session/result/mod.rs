@@ -1,0 +1,13 @@
+//! The result of a run: its numbers, whether it can be trusted, and the accuracy that is required of it.
+//!
+//! - `answer`: trust, cause and required accuracy in one sentence.
+//! - `run_summary`: content of `summary.json`.
+//! - `truth`: errors against ground truth, and whether it fits the run.
+
+mod answer;
+mod run_summary;
+pub(in crate::session) mod truth;
+
+pub use answer::{Answer, FindingSource, Requirement, RunFinding};
+pub use run_summary::{RankSummary, RunSummary, StageSummary, TimingSummary, summarize};
+pub use truth::TruthAgreement;
