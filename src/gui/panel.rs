@@ -5,6 +5,7 @@ use std::sync::Arc;
 use egui::{Role, Sense, Ui};
 use serde::{Deserialize, Serialize};
 
+use super::derived::answers::Answers;
 use super::derived::flight::{FlightReport, FlightTables};
 use super::derived::reading::Reading;
 use super::derived::slide::MovedChain;
@@ -14,7 +15,7 @@ use crate::gimbal::{ParameterId, ParameterNames};
 use crate::observability::{ChainSlide, SlidePosition};
 use crate::session::breakpoints::Breakpoints;
 use crate::session::{
-    Command, DiagnosisProgress, FrameImage, Markers, Recording, RunRecord, SolverPosition, StepRecord,
+    Answer, Command, DiagnosisProgress, FrameImage, Markers, Recording, RunRecord, SolverPosition, StepRecord,
 };
 use crate::text::Named;
 
@@ -55,6 +56,8 @@ pub struct Selection {
     pub reading: Reading,
     /// Calibration tables of the runs.
     pub(crate) flight: FlightTables,
+    /// Trust, cause and required accuracy of the runs.
+    pub(crate) answers: Answers,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -164,6 +167,11 @@ impl<'a> PanelContext<'a> {
     /// Calibration table of a run over the whole flight.
     pub(crate) fn flight(&self, ui: &Ui, run: &RunRecord) -> FlightReport {
         self.selection.flight.report(ui.ctx(), self.recording, run)
+    }
+
+    /// Answer of a run: trust, cause and required accuracy.
+    pub(crate) fn answer(&self, run: &RunRecord) -> Arc<Answer> {
+        self.selection.answers.of(self.recording, run)
     }
 
     /// Computes the moved chain of the selected run when position, run or step has changed.

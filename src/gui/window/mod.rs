@@ -3,6 +3,7 @@
 //! The real window and headless screenshots both draw [`window_ui`].
 
 mod actions;
+mod answer_bar;
 mod context_menu;
 mod copying;
 #[cfg(test)]
@@ -98,6 +99,10 @@ pub fn window_ui(ui: &mut Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>
 
     let bar = Frame::new().fill(theme.surface).inner_margin(Margin::symmetric(8, 3));
     egui::Panel::top("top bar").exact_size(30.0).frame(bar).show(ui, |ui| top_bar::ui(ui, state, ctx, &mut actions));
+    egui::Panel::top("answer")
+        .exact_size(answer_bar::HEIGHT)
+        .frame(bar)
+        .show(ui, |ui| answer_bar::ui(ui, ctx, &mut actions));
     notices::banner_ui(ui, ctx);
 
     // The panels are drawn before the timeline below them, because the Tab key follows the order of drawing.
