@@ -209,6 +209,7 @@ fn recording_of(ranks: &[usize]) -> Recording {
         truth_is_batch: false,
         position_truth: None,
         trajectories: Vec::new(),
+        check: None,
         warnings: Vec::new(),
         memory_budget_bytes: usize::MAX,
     }

@@ -271,6 +271,7 @@ mod tests {
                 truth_is_batch: false,
                 position_truth: None,
                 trajectories: Vec::new(),
+                check: None,
                 warnings: Vec::new(),
                 memory_budget_bytes: usize::MAX,
             }
