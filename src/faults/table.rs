@@ -4,6 +4,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use serde::Serialize;
 
+use crate::sensors::STANDARD_GRAVITY_M_PER_S2;
 use crate::text::Named;
 
 /// Kind of a fault; its row is in [`TABLE`].
@@ -264,7 +265,7 @@ pub const TABLE: &[Row] = &[
         .useless(USELESS_RATIO),
     Row::new(FaultKind::AccelerometerScale, "accelerometer_scale", Sensor::Imu, Area::Imu)
         .corrected("accelerometer-scale", &[Part::Factor], "FACTOR")
-        .tried(&[9.806_65, 1.0 / 9.806_65, 2.0, 0.5])
+        .tried(&[STANDARD_GRAVITY_M_PER_S2, 1.0 / STANDARD_GRAVITY_M_PER_S2, 2.0, 0.5])
         .useless(USELESS_RATIO),
     Row::new(FaultKind::Clocks, "clocks", Sensor::Camera, Area::Time),
     Row::new(FaultKind::Shutter, "shutter", Sensor::Camera, Area::Time),

@@ -7,12 +7,10 @@ use crate::flight_log::stream::angle_fit::FittedAngle;
 use crate::geometry::{best_rotation, mean_square_quantile, so3};
 use crate::gimbal::{Chain, ClassicalChain, Parameterization};
 use crate::log_check::clock_alignment::BIAS_SIGMA_RAD_PER_S;
-use crate::log_check::statistics::{median, percentile};
+use crate::log_check::statistics::{SIGNIFICANT_SIGMAS, median, percentile};
 use crate::optimization::NormalEquations;
 use crate::optimization::damped::{DampedOptions, LeastSquares, minimize};
 
-/// Quantile of the standard normal distribution beyond which a misfit is significant.
-const SIGNIFICANT_SIGMAS: f64 = 3.0;
 /// Ratio up to which noise may exceed its stated level: the other checks accept twice the rig's encoder noise.
 const NOISE_TOLERANCE: f64 = 2.0;
 /// Quantile of the misfits that is compared with the same quantile of a standard normal number (70 %): up to three of
