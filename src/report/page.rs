@@ -6,7 +6,8 @@ use super::content::{ReportContent, ReportFigure, RunContent};
 use super::html::{document, figure, icon, list, list_in_columns, unbroken};
 use super::rank_intervals::RankInterval;
 use super::tables;
-use super::verdict::Statement;
+use super::verdict::{Statement, StatementLevel};
+use crate::log_check::Trust;
 use crate::table::Medium::Page;
 
 pub(super) fn page(content: &ReportContent, figures: &[ReportFigure]) -> String {
@@ -60,10 +61,20 @@ pub(super) fn page(content: &ReportContent, figures: &[ReportFigure]) -> String 
 /// Answer of a run: trust, cause and required accuracy in one sentence, and what to do first.
 fn answer(content: &ReportContent, run: &RunContent) -> Markup {
     let found = &run.summary.answer;
+    let unmet = found.requirement.as_ref().is_some_and(|it| it.met < it.parameters);
+    let level = match found.trust {
+        Trust::NotUsable => StatementLevel::Error,
+        Trust::Doubtful => StatementLevel::Warning,
+        Trust::Trusted if unmet => StatementLevel::Warning,
+        Trust::Trusted => StatementLevel::Good,
+    };
+    // Not every font has the symbol of the sentence.
+    let sentence = found.sentence.split_once(' ').map_or(found.sentence.as_str(), |(_, words)| words);
     html! {
         p.answer {
             @if content.runs.len() > 1 { (run.label) ": " }
-            strong { (found.sentence) }
+            (icon(level)) " "
+            strong { (unbroken(sentence)) }
             @if !found.remedy.is_empty() { br; "→ " (found.remedy) }
         }
     }

@@ -4,8 +4,15 @@ use std::collections::BTreeMap;
 
 use super::imports::{is_test_file, source_files};
 
-/// Folders whose constants have rows.
-const DECIDE: [&str; 5] = ["faults/", "session/diagnosis/", "session/misfit/", "session/result/", "log_check/"];
+/// Folders and files whose constants have rows.
+const DECIDE: [&str; 6] = [
+    "faults/",
+    "session/diagnosis/",
+    "session/misfit/",
+    "session/result/answer.rs",
+    "session/result/truth.rs",
+    "log_check/",
+];
 
 /// Constants whose digits decide nothing: a table with rows of its own, columns of fits and of a text, neutral values.
 const NOT_NUMBERS: [&str; 8] = ["TABLE", "BIAS", "OFFSET", "SCALE", "CHAIN", "UNKNOWNS", "NONE", "UNEXPLAINED"];
