@@ -94,7 +94,7 @@ impl Session {
     }
 
     /// Checks the log and its rig; returns when the findings are in the record.
-    pub fn check_log(&mut self) {
+    pub fn check_log(&self) {
         let rotations = image_rotations(&self.plan.log, &self.plan.rig);
         let checked = log_check::check(&self.plan.log, Ok(&self.plan.rig), &rotations);
         self.shared.change(|computation| computation.set_check(checked.findings));
