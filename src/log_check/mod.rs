@@ -29,5 +29,5 @@ pub use self::clock_alignment::{
 pub use self::noise::{
     AllanPoint, AllanReport, AxisNoise, GivenNoise, NoiseTerm, NoiseTerms, SensorNoise, measure_noise,
 };
-pub use self::report::verdict::{Trust, Verdict, joint_statement};
+pub use self::report::verdict::{Trust, Verdict, joint_statement, problems};
 pub use self::report::{Area, CheckReport, Finding, ImageRotation, ProposedMask, Severity, TopicReport};

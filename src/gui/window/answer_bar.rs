@@ -61,12 +61,12 @@ fn buttons_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, answer: &Answer, actions:
 }
 
 fn color(answer: &Answer, theme: &Theme) -> egui::Color32 {
-    let unmet = answer.requirement.as_ref().is_some_and(|it| it.met < it.parameters);
+    let is_met = answer.requirement.as_ref().is_some_and(|it| it.met == it.parameters);
     match answer.trust {
         Trust::NotUsable => theme.error,
         Trust::Doubtful => theme.warn,
-        Trust::Trusted if unmet => theme.text_strong,
-        Trust::Trusted => theme.ok,
+        Trust::Trusted if is_met => theme.ok,
+        Trust::Trusted => theme.text_strong,
     }
 }
 
@@ -74,10 +74,47 @@ fn color(answer: &Answer, theme: &Theme) -> egui::Color32 {
 fn hover_text(answer: &Answer) -> String {
     let mut lines = vec![answer.sentence.clone()];
     for finding in &answer.findings {
-        lines.push(format!("{} {}", finding.trust.mark(), finding.statement));
-        lines.extend(
-            [&finding.evidence, &finding.remedy].into_iter().filter(|it| !it.is_empty()).map(|it| format!("    {it}")),
-        );
+        lines.push(format!("{} {}", finding.trust.mark(), finding.sentence()));
+        lines.extend((!finding.evidence.is_empty()).then(|| format!("    {}", finding.evidence)));
     }
     lines.join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use egui_kittest::kittest::Queryable as _;
+
+    use crate::faults::{Area, Fault, FaultKind, Severity};
+    use crate::gui::window::tests::{bench, bench_of, commands_of, sample};
+    use crate::log_check::Finding;
+    use crate::session::Command;
+
+    #[test]
+    fn the_bar_names_the_fault_and_its_button_corrects_it() {
+        assert!(bench().query_by_label("Apply and run again").is_none());
+        let mut recording = sample();
+        let title = "joint 'yaw' counts in the other direction than in the rig";
+        recording.check = Some(Arc::new(vec![Finding {
+            severity: Severity::Error,
+            area: Area::Encoders,
+            title: title.to_owned(),
+            evidence: "rotations differ by 2.6°".to_owned(),
+            remedy: "reverse the sign of the readings of 'yaw' in the driver".to_owned(),
+            is_assumption: false,
+            faults: vec![Fault::from(FaultKind::JointReversed).of_joints(&["yaw".to_owned()])],
+        }]));
+        let label = format!("{}  ✖ Not usable: {title}", recording.runs[0].spec.label);
+        let mut harness = bench_of(recording, [1600.0, 900.0]);
+        assert!(harness.query_by_label(&label).is_some(), "{label}");
+        let pushed = commands_of(&mut harness, |harness| harness.get_by_label("Apply and run again").click());
+        let changes = "correct=reversed:yaw".parse().unwrap();
+        assert_eq!(pushed, [Command::Seek { stamp_ns: 0 }, Command::Fork { run: 0, changes, label: None }]);
+        // The list of warnings has it, too.
+        harness.state_mut().window.notices.list_open = true;
+        harness.run_steps(3);
+        let row = format!("{title}; reverse the sign of the readings of 'yaw' in the driver");
+        assert!(harness.query_by_label(&row).is_some(), "{row}");
+    }
 }

@@ -7,6 +7,7 @@ use egui::{Align2, Area, Button, Color32, Frame, Id, Margin, Order, Panel, RichT
 use crate::gui::PanelContext;
 use crate::gui::theme::{Theme, dialog_frame};
 use crate::gui::units::seconds;
+use crate::log_check::Trust;
 use crate::session::Command;
 use crate::session::warning_lines;
 
@@ -134,8 +135,18 @@ impl Notices {
         let window = egui::Window::new("Warnings").open(&mut open).collapsible(false).default_size(vec2(520.0, 260.0));
         window.anchor(Align2::RIGHT_BOTTOM, vec2(-16.0, -40.0)).show(ui.ctx(), |ui| {
             let warnings = warning_lines(ctx.recording);
-            if warnings.is_empty() {
+            let answer = ctx.selected_run().map(|run| ctx.answer(run));
+            let findings = answer.as_ref().map_or(&[][..], |answer| &answer.findings);
+            if warnings.is_empty() && findings.is_empty() {
                 ui.label(RichText::new("No warnings").color(theme.text_weak));
+            }
+            for finding in findings {
+                let color = if finding.trust == Trust::NotUsable { theme.error } else { theme.warn };
+                ui.horizontal_top(|ui| {
+                    ui.label(RichText::new(finding.trust.mark()).color(color));
+                    let text = RichText::new(finding.sentence()).color(theme.text_strong);
+                    ui.add(egui::Label::new(text).wrap()).on_hover_text(&finding.evidence);
+                });
             }
             for (level, text) in self.kept.iter().filter(|(level, _)| *level != NoticeLevel::Info) {
                 let (mark, color) = level.look(&theme);

@@ -91,7 +91,8 @@ pub(super) fn ui(
             let text = format!("{}.{:09}", stamp_ns.div_euclid(1_000_000_000), stamp_ns.rem_euclid(1_000_000_000));
             pair(5, "stamp", text, "header.stamp of the frame at the cursor, s since the Unix epoch");
         }
-        let count = warning_lines(ctx.recording).len();
+        let findings = ctx.selected_run().map_or(0, |run| ctx.answer(run).findings.len());
+        let count = warning_lines(ctx.recording).len() + findings;
         let reserved = RIGHT_WIDTH
             + if status.progress.is_some() { PROGRESS_WIDTH + 5.0 } else { 0.0 }
             + if status.opening.is_some() { OPENING_WIDTH } else { 0.0 };
@@ -103,7 +104,11 @@ pub(super) fn ui(
                 (format!("⚠ {}", counted(count, "warning")), theme.warn)
             };
             let button = Button::new(RichText::new(text).small().color(color)).frame(count > 0);
-            if ui.add(button).on_hover_text("Warnings of the log and the runs (W)").clicked() {
+            if ui
+                .add(button)
+                .on_hover_text("Findings about the shown run, warnings of the log and the runs (W)")
+                .clicked()
+            {
                 notices.list_open = !notices.list_open;
             }
             if let Some(progress) = &status.progress {

@@ -67,6 +67,13 @@ impl Trust {
     }
 }
 
+/// Errors and warnings, the ones with the largest effect on a result first.
+pub fn problems(findings: &[Finding]) -> Vec<&Finding> {
+    let mut problems: Vec<&Finding> = findings.iter().filter(|it| it.severity >= Severity::Warning).collect();
+    problems.sort_by_key(|it| (std::cmp::Reverse(it.severity), it.is_assumption, effect(it.area)));
+    problems
+}
+
 /// Statement of the findings with the largest effect: the first one, or causes that are about equally likely.
 pub fn joint_statement(findings: &[&Finding]) -> String {
     let alternatives: Vec<&str> = findings.iter().map_while(|it| it.title.strip_prefix(MOST_LIKELY)).collect();
@@ -99,10 +106,7 @@ impl Verdict {
         let count = |severity: Severity| findings.iter().filter(|finding| finding.severity == severity).count();
         let (errors, warnings) = (count(Severity::Error), count(Severity::Warning));
         let trust = findings.iter().map(Trust::after).max().unwrap_or_default();
-        let mut problems: Vec<&Finding> =
-            findings.iter().filter(|finding| finding.severity >= Severity::Warning).collect();
-        problems
-            .sort_by_key(|finding| (std::cmp::Reverse(finding.severity), finding.is_assumption, effect(finding.area)));
+        let problems = problems(findings);
         let sentence = match trust {
             Trust::Trusted => format!("{} {NO_FAULT}", trust.mark()),
             Trust::Doubtful | Trust::NotUsable => {

@@ -8,7 +8,7 @@ use serde::{Serialize, Serializer};
 use super::truth;
 use crate::faults::{Area, Fault, FaultKind, LONGEST_SHIFT_S, Sensor};
 use crate::geometry::{Dimension, ns_from_seconds, seconds_from_ns};
-use crate::log_check::{Finding, Trust, joint_statement};
+use crate::log_check::{Finding, Trust, joint_statement, problems};
 use crate::observability::Determination;
 use crate::sensors::Rig;
 use crate::session::misfit::agreement::{self, AgreementValue};
@@ -56,6 +56,12 @@ pub struct RunFinding {
 }
 
 impl RunFinding {
+    /// Statement and remedy.
+    pub fn sentence(&self) -> String {
+        let remedy = if self.remedy.is_empty() { String::new() } else { format!("; {}", self.remedy) };
+        format!("{}{remedy}", self.statement)
+    }
+
     /// Changes of a fork that undo the fault, and the stamp of its first step in nanoseconds since the log began; `None` if
     /// no fault is known or no constant correction undoes it.
     pub fn correction(&self) -> Option<(ForkChanges, i64)> {
@@ -143,17 +149,18 @@ fn statement(findings: &[RunFinding]) -> String {
 
 /// Sentence about a trusted run without estimated parameters.
 fn fixed_sentence(run: &RunRecord) -> String {
-    let mark = Trust::Trusted.mark();
     if run.steps.iter().any(|step| step.report.newest().is_some()) {
+        let mark = Trust::Trusted.mark();
         format!("{mark} Nothing speaks against the estimate; the calibration is fixed at the values of the rig")
     } else {
-        format!("{mark} No estimate yet")
+        "… Waiting for the first estimate".to_owned()
     }
 }
 
 /// Findings of the check that concern a run and that the run does not correct.
 fn check_findings<'a>(rig: &'a Rig, check: &'a [Finding], run: &'a RunRecord) -> impl Iterator<Item = RunFinding> + 'a {
-    let relevant = check.iter().filter(|finding| concerns(finding, rig, run) && !is_undone(finding, run));
+    let relevant =
+        problems(check).into_iter().filter(|finding| concerns(finding, rig, run) && !is_undone(finding, run));
     relevant.filter_map(|finding| {
         let trust = Trust::after(finding);
         (trust > Trust::Trusted).then(|| RunFinding {
