@@ -41,7 +41,7 @@ pub enum FindingSource {
 pub struct RunFinding {
     pub trust: Trust,
     pub source: FindingSource,
-    /// In one sentence.
+    /// The reason in one sentence.
     pub statement: String,
     /// Measured values with units.
     pub evidence: String,
@@ -56,7 +56,7 @@ pub struct RunFinding {
 }
 
 impl RunFinding {
-    /// Statement and remedy.
+    /// Statement and remedy in one line, without the evidence.
     pub fn sentence(&self) -> String {
         let remedy = if self.remedy.is_empty() { String::new() } else { format!("; {}", self.remedy) };
         format!("{}{remedy}", self.statement)
@@ -105,7 +105,7 @@ pub struct Answer {
     pub trust: Trust,
     /// The answer in one sentence.
     pub sentence: String,
-    /// What to do first; empty if nothing is known.
+    /// First thing to do about it; empty if nothing is known.
     pub remedy: String,
     /// Findings with the largest effect first.
     pub findings: Vec<RunFinding>,
