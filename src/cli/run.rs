@@ -47,6 +47,9 @@ pub(crate) struct RunArguments {
     /// folder that contains nothing else.
     #[arg(long)]
     pub force: bool,
+    /// Do not check the log and its rig meanwhile: the answer of a run then follows from the run alone.
+    #[arg(long)]
+    pub no_check: bool,
     /// Print the summaries as JSON instead of a table.
     #[arg(long)]
     pub json: bool,
@@ -71,12 +74,17 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitOutcome> {
     let needs_whole_steps = arguments.mcap || arguments.break_at.is_some();
     let memory_budget_bytes = if needs_whole_steps { plan.memory_budget_bytes } else { SUMMARY_BUDGET_BYTES };
     let plan = SessionPlan { interrupted: interrupt.flag(), memory_budget_bytes, ..plan.clone() };
-    let (computed, checked) = beside_check(&plan, || match &arguments.break_at {
+    let estimate = || match &arguments.break_at {
         Some(condition) => compute_until(&plan, condition),
         None => Ok((compute(&plan, None)?.into_recording(), None)),
-    });
-    let (mut recording, hit) = computed?;
-    recording.check = Some(Arc::new(checked.findings));
+    };
+    let (recording, hit) = if arguments.no_check {
+        estimate()?
+    } else {
+        let (computed, checked) = beside_check(&plan, estimate);
+        let (recording, hit) = computed?;
+        (Recording { check: Some(Arc::new(checked.findings)), ..recording }, hit)
+    };
     let no_steps = recording.runs.iter().all(|run| run.steps.is_empty());
     if interrupt.is_set() && no_steps {
         notify("dcvins: interrupted before the first step; nothing is written");
