@@ -1,18 +1,15 @@
 //! The check of a log beside other work.
 
 use anyhow::Result;
-use dcvins::log_check::{self, CheckReport};
-use dcvins::session::{SessionPlan, image_rotations};
+use dcvins::log_check::CheckReport;
+use dcvins::session::{SessionPlan, check_log};
 
 use crate::cli::terminal::Progress;
 
 /// Runs `work` while another thread checks the log and its rig.
 pub(crate) fn beside_check<T>(plan: &SessionPlan, work: impl FnOnce() -> Result<T>) -> (Result<T>, CheckReport) {
     std::thread::scope(|scope| {
-        let checking = scope.spawn(|| {
-            let rotations = image_rotations(&plan.log, &plan.rig);
-            log_check::check(&plan.log, Ok(&plan.rig), &rotations)
-        });
+        let checking = scope.spawn(|| check_log(&plan.log, &plan.rig));
         let done = work();
         let _progress = Progress::spinner("checking the log");
         (done, checking.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))

@@ -2,7 +2,7 @@
 
 use nalgebra::{UnitQuaternion, Vector2, Vector3};
 
-use super::table::{Change, FaultKind, Parameter, Part};
+use super::table::{Change, FaultKind, LONGEST_SHIFT_S, Parameter, Part};
 use crate::geometry::{SignedAxes, so3};
 use crate::text::Named;
 
@@ -169,6 +169,17 @@ impl Fault {
             _ => return vec![self.clone()],
         };
         self.joints.chunks(size).map(|joints| Self::from(self.kind).of_joints(joints)).collect()
+    }
+
+    /// True if a correction of a fork undoes this fault on a rig with a number of joints: a fork has the samples of a short
+    /// time around an image, and scales the readings of all joints alike.
+    pub fn can_be_corrected(&self, joints: usize) -> bool {
+        let is_possible = match self.kind {
+            FaultKind::CameraClock | FaultKind::EncoderClock => self.value(0).abs() <= LONGEST_SHIFT_S,
+            FaultKind::JointScale => self.joints.is_empty() || joints <= 1,
+            _ => true,
+        };
+        is_possible && self.kind.row().correction.is_some()
     }
 
     /// Parameter of the value with a number; `None` if it is not fitted.

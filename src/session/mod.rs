@@ -34,8 +34,8 @@ pub(crate) mod tests;
 pub use diagnosis::{Diagnosis, DiagnosisVerdict, LogFaults, RankedCause, WaitingReason, diagnose};
 pub use engine::{
     BreakpointHit, CalibrationErrors, CalibrationRequest, CalibrationRun, CalibrationRunError, Computation,
-    FlightNoiseError, SnapshotUse, Stopwatch, calibrate, camera_rotations, compute, compute_until, fit_flight_noise,
-    image_rotations, situation_before_flight,
+    FlightNoiseError, SnapshotUse, Stopwatch, calibrate, camera_rotations, check_log, compute, compute_until,
+    fit_flight_noise, image_rotations, situation_before_flight,
 };
 pub use misfit::AgreementValue;
 pub use plan::{

@@ -46,7 +46,7 @@ fn buttons_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, answer: &Answer, actions:
     {
         actions.push(Action::Dialog(Dialog::Diagnosis));
     }
-    if let Some((changes, from_ns)) = first.correction() {
+    if let Some((changes, from_ns)) = first.correction(&ctx.recording.rig) {
         let button = ui.add_enabled(ctx.recording.runs.len() < MAX_RUNS, Button::new("Apply and run again"));
         if button.on_hover_text(format!("Fork with {changes}")).clicked() {
             ctx.commands.push(Command::Seek { stamp_ns: from_ns });

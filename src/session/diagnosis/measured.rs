@@ -10,12 +10,12 @@ use super::hypotheses::{
 };
 use super::trial::DiagnosedRun;
 use super::tuning::rounded;
-use crate::faults::{Fault, FaultKind, LONGEST_SHIFT_S, Sensor, Severity};
+use crate::faults::{Fault, FaultKind, Sensor, Severity};
 use crate::flight_log::FlightLog;
 use crate::geometry::ns_from_seconds;
-use crate::log_check::{self, Finding};
+use crate::log_check::Finding;
 use crate::sensors::Rig;
-use crate::session::engine::image_rotations;
+use crate::session::engine::check_log;
 
 /// Changes that undo measured faults.
 #[derive(Debug, Default)]
@@ -87,18 +87,17 @@ fn hypotheses(run: &DiagnosedRun<'_>, fault: &Fault) -> Option<Vec<TrialHypothes
             gyroscope: fault.axes().into_iter().collect(),
             ..PlausibleAxes::default()
         }),
-        // A fork has the samples of a short time around an image, and scales the readings of all joints alike.
-        (FaultKind::CameraClock | FaultKind::EncoderClock, [shift_s]) if shift_s.abs() > LONGEST_SHIFT_S => Vec::new(),
-        (FaultKind::JointScale, _) if !fault.joints.is_empty() && run.rig.joint_names().len() > 1 => Vec::new(),
         (FaultKind::JointReversed | FaultKind::JointsSwapped, _) => {
             vec![TrialHypothesis::corrections(fault.kind, fault.of_single_joints())]
         }
-        _ if row.correction.is_some() => {
-            let hypothesis =
-                TrialHypothesis::correction(Fault { values, camera: None, since_s: None, ..fault.clone() });
+        _ => {
+            let corrected = Fault { values, camera: None, since_s: None, ..fault.clone() };
+            if !corrected.can_be_corrected(run.rig.joint_names().len()) {
+                return Some(Vec::new());
+            }
+            let hypothesis = TrialHypothesis::correction(corrected);
             vec![fault.since_s.map_or_else(|| hypothesis.clone(), |since_s| hypothesis.starting(step_at(since_s)))]
         }
-        _ => Vec::new(),
     })
 }
 
@@ -114,9 +113,7 @@ impl LogFaults {
     pub(super) fn of(&self, log_path: &Path, rig: &Rig) -> &[Finding] {
         self.found.get_or_init(|| {
             let Ok(log) = FlightLog::open(log_path) else { return Vec::new() };
-            let log = Arc::new(log);
-            let rotations = image_rotations(&log, rig);
-            log_check::check(&log, Ok(rig), &rotations).verdict().first
+            check_log(&Arc::new(log), rig).verdict().first
         })
     }
 }

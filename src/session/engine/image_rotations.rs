@@ -12,7 +12,7 @@ use crate::flight_log::{FlightLog, FrameStream, ImageReader, LogError, MessageKi
 use crate::frontend::readout::{RowObservation, RowTrack};
 use crate::frontend::{FeatureId, FrontEnd, FrontEndOptions, TrackedFeature, TrackedFrame};
 use crate::geometry::seconds_from_ns;
-use crate::log_check::ImageRotation;
+use crate::log_check::{self, CheckReport, ImageRotation};
 use crate::sensors::{CameraRig, GrayImage, Rig};
 
 /// Smallest and largest number of sections of the log, evenly spaced: a fault that begins in the flight is found in logs
@@ -30,6 +30,11 @@ const ROTATION_SIGMA_RAD: f64 = 0.3;
 /// Minimum number of common features for a rotation.
 const MIN_PAIRS: usize = 30;
 const MIN_INLIER_RATIO: f64 = 0.6;
+
+/// Checks a log against its rig with the rotations between its images.
+pub fn check_log(log: &Arc<FlightLog>, rig: &Rig) -> CheckReport {
+    log_check::check(log, Ok(rig), &image_rotations(log, rig))
+}
 
 /// Rotations between consecutive images of some sections of the log, for every camera of the rig that the log has.
 ///

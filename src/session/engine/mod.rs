@@ -38,7 +38,7 @@ pub(in crate::session) use fork::apply_fork;
 pub(in crate::session) use history::History;
 pub use history::SnapshotUse;
 pub(in crate::session) use image_rotations::rotation_between;
-pub use image_rotations::{camera_rotations, image_rotations};
+pub use image_rotations::{camera_rotations, check_log, image_rotations};
 #[cfg(test)]
 pub(in crate::session) use passes::EarlierPasses;
 pub(in crate::session) use passes::guarded;

@@ -13,9 +13,8 @@ use super::saved::PendingRestore;
 use super::shared::{SharedComputation, Wake};
 use crate::flight_log::ImageReader;
 use crate::geometry::ns_from_seconds;
-use crate::log_check;
 use crate::session::breakpoints::{Breakpoints, Condition};
-use crate::session::engine::{Computation, Engine, RecomputeThread, image_rotations};
+use crate::session::engine::{Computation, Engine, RecomputeThread, check_log};
 use crate::session::plan::{SessionError, SessionPlan, SessionRequest};
 use crate::session::record::{Recording, SolverPosition};
 
@@ -95,8 +94,7 @@ impl Session {
 
     /// Checks the log and its rig; returns when the findings are in the record.
     pub fn check_log(&self) {
-        let rotations = image_rotations(&self.plan.log, &self.plan.rig);
-        let checked = log_check::check(&self.plan.log, Ok(&self.plan.rig), &rotations);
+        let checked = check_log(&self.plan.log, &self.plan.rig);
         self.shared.change(|computation| computation.set_check(checked.findings));
     }
 

@@ -27,7 +27,7 @@ pub struct FlightParameter {
     pub ratio: Option<f64>,
     pub verdict: Determination,
     /// Stamp from which the verdict holds without interruption, in nanoseconds since the log began (in files seconds).
-    #[serde(rename = "since_s", serialize_with = "seconds")]
+    #[serde(rename = "since_s", serialize_with = "optional_seconds")]
     pub since_ns: Option<i64>,
     /// Cause of any other verdict than determined.
     pub cause: Option<LossCause>,
@@ -58,8 +58,12 @@ pub struct ParameterSummary {
     pub error: Option<f64>,
 }
 
+/// Writes a stamp in nanoseconds as seconds.
 #[expect(clippy::ref_option, reason = "the signature that serde calls")]
-fn seconds<S: Serializer>(stamp_ns: &Option<i64>, serializer: S) -> Result<S::Ok, S::Error> {
+pub(in crate::session) fn optional_seconds<S: Serializer>(
+    stamp_ns: &Option<i64>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
     stamp_ns.map(seconds_from_ns).serialize(serializer)
 }
 

@@ -25,6 +25,7 @@ pub use antenna_record::PositionTruth;
 pub use calibration_columns::CalibrationRow;
 pub use collected_information::CollectedInformation;
 pub use comparison::{ComparedQuantity, Comparison, Divergence};
+pub(in crate::session) use flight_parameter::optional_seconds;
 pub use flight_parameter::{FlightParameter, ParameterSummary};
 pub use flight_verdicts::{FlightVerdicts, flight_advice, flight_headline, flight_table, least_determined};
 pub use image_residuals::{ImageResiduals, MeanResidual, ResidualSum};

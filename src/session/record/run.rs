@@ -192,6 +192,12 @@ impl RunRecord {
         reasons.into_iter().map(|(message, count)| (message.to_owned(), count)).collect()
     }
 
+    /// Keys of the cameras of its last step, the main one first.
+    pub(in crate::session) fn last_camera_keys(&self) -> Vec<&str> {
+        let main = || vec![self.camera_key.as_str()];
+        self.steps.last().map_or_else(main, |step| self.camera_keys(&step.report.calibration))
+    }
+
     /// Removes the steps after a stamp.
     pub(in crate::session) fn end_at(&mut self, stamp_ns: i64) {
         let count = self.steps.partition_point(|step| step.report.stamp_ns <= stamp_ns);

@@ -3,10 +3,10 @@
 //! It is made in one place from what the check of the log measured, from the run's residuals and from its calibration.
 //! Window, command line, report and files begin with it.
 
-use serde::{Serialize, Serializer};
+use serde::Serialize;
 
 use super::truth;
-use crate::faults::{Area, Fault, FaultKind, LONGEST_SHIFT_S, Sensor};
+use crate::faults::{Area, Fault, FaultKind, Sensor};
 use crate::geometry::{Dimension, ns_from_seconds, seconds_from_ns};
 use crate::log_check::{Finding, Trust, joint_statement, problems};
 use crate::observability::Determination;
@@ -14,7 +14,7 @@ use crate::sensors::Rig;
 use crate::session::misfit::agreement::{self, AgreementValue};
 use crate::session::misfit::{Misfit, StepMisfit};
 use crate::session::plan::ForkChanges;
-use crate::session::record::{Recording, RunRecord, StepRecord};
+use crate::session::record::{Recording, RunRecord, StepRecord, optional_seconds};
 use crate::table::Shown;
 
 /// Fewest steps with a window from which the residuals of a run are judged: the first windows settle.
@@ -48,7 +48,7 @@ pub struct RunFinding {
     /// Instruction; empty if none is known.
     pub remedy: String,
     /// Stamp from which on it holds, in nanoseconds since the log began (in files seconds); `None` for the whole run.
-    #[serde(rename = "since_s", serialize_with = "seconds")]
+    #[serde(rename = "since_s", serialize_with = "optional_seconds")]
     pub since_ns: Option<i64>,
     /// Finding of the check with the faults of measurements or rig.
     #[serde(skip)]
@@ -64,11 +64,9 @@ impl RunFinding {
 
     /// Changes of a fork that undo the fault, and the stamp of its first step in nanoseconds since the log began; `None` if
     /// no fault is known or no constant correction undoes it.
-    pub fn correction(&self) -> Option<(ForkChanges, i64)> {
+    pub fn correction(&self, rig: &Rig) -> Option<(ForkChanges, i64)> {
         let [fault] = self.checked.as_ref()?.faults.as_slice() else { return None };
-        fault.kind.row().correction.as_ref()?;
-        let is_clock = matches!(fault.kind, FaultKind::CameraClock | FaultKind::EncoderClock);
-        if is_clock && fault.value(0).abs() > LONGEST_SHIFT_S {
+        if !fault.can_be_corrected(rig.joint_names().len()) {
             return None;
         }
         let corrections = match fault.kind {
@@ -77,11 +75,6 @@ impl RunFinding {
         };
         Some((ForkChanges { corrections, ..ForkChanges::default() }, fault.since_s.map_or(0, ns_from_seconds)))
     }
-}
-
-#[expect(clippy::ref_option, reason = "the signature that serde calls")]
-fn seconds<S: Serializer>(stamp_ns: &Option<i64>, serializer: S) -> Result<S::Ok, S::Error> {
-    stamp_ns.map(seconds_from_ns).serialize(serializer)
 }
 
 /// Parameters of a run against the required accuracy.
@@ -190,19 +183,13 @@ fn concerns(finding: &Finding, rig: &Rig, run: &RunRecord) -> bool {
     let names = |key: &str| {
         finding.title.split(|letter: char| !letter.is_alphanumeric() && letter != '_').any(|word| word == key)
     };
-    let used = cameras(run);
+    let used = run.last_camera_keys();
     let named: Vec<&str> = rig.cameras.iter().map(|it| it.key.as_str()).filter(|key| names(key)).collect();
     named.is_empty() || named.iter().any(|key| used.contains(key))
 }
 
 fn has_joints(step: &StepRecord) -> bool {
     !step.report.calibration.classical.links.is_empty()
-}
-
-/// Keys of the cameras of a run, the main one first.
-fn cameras(run: &RunRecord) -> Vec<&str> {
-    let rigid = run.steps.last().into_iter().flat_map(|step| &step.report.calibration.rigid_cameras);
-    std::iter::once(run.camera_key.as_str()).chain(rigid.map(|(key, _)| key.as_str())).collect()
 }
 
 /// True if the run corrects a fault of the finding, or estimates the values that it concerns, and its residuals agree with

@@ -174,7 +174,7 @@ pub fn summarize(recording: &Recording, run: &RunRecord, timing: bool) -> RunSum
         log: log_name(&recording.log_path),
         run: run.spec.to_string(),
         answer: Answer::of_run(recording, run),
-        camera: cameras(run),
+        camera: run.last_camera_keys().join(", "),
         frames: FrameCounts {
             total: run.steps.len(),
             estimated: estimated.len(),
@@ -192,12 +192,6 @@ pub fn summarize(recording: &Recording, run: &RunRecord, timing: bool) -> RunSum
         warnings: warnings(recording, run),
         trajectories: recording.trajectories.clone(),
     }
-}
-
-/// Keys of the run's cameras, the main one first.
-fn cameras(run: &RunRecord) -> String {
-    let rigid = run.steps.last().into_iter().flat_map(|step| &step.report.calibration.rigid_cameras);
-    rigid.fold(run.camera_key.clone(), |cameras, (key, _)| format!("{cameras}, {key}"))
 }
 
 /// Reasons of the last failed initialization attempt.

@@ -55,7 +55,7 @@ fn a_fault_of_the_check_comes_first_where_the_run_uses_what_is_faulty() {
     let found = answer(&flight, std::slice::from_ref(&joint), &run);
     let sentence = "✖ Not usable: joint 'yaw' counts in the other direction than in the rig";
     assert_eq!((found.sentence.as_str(), found.remedy.as_str()), (sentence, "mend it"));
-    let (changes, from_ns) = found.findings[0].correction().expect("a fork that undoes it");
+    let (changes, from_ns) = found.findings[0].correction(&flight.given_rig).expect("a fork that undoes it");
     assert_eq!((changes.to_string().as_str(), from_ns), ("correct=reversed:yaw", 0));
     // Joint angles do not matter to a run without encoders, another camera's images never do.
     let without = estimated(&flight, "auto:encoder=off");
