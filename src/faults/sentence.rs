@@ -44,7 +44,7 @@ pub struct Subject<'a> {
 }
 
 impl Subject<'_> {
-    /// The fault in words; its values are those of its kind.
+    /// The fault in words; its values have the order of its kind.
     pub fn sentence(&self, fault: &Fault) -> Sentence {
         let severity = if fault.is_useless() { Severity::Error } else { Severity::Warning };
         let (statement, remedy) = self.texts(fault);

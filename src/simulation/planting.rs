@@ -70,7 +70,7 @@ impl Planting {
         time_ns + ns_from_seconds(self.acting(seconds_from_ns(time_ns)).map(Fault::joint_shift_s).sum())
     }
 
-    /// Camera at a time in seconds if its focal length is no longer that of its model.
+    /// Camera at a time in seconds if its focal length differs from the one of its model.
     pub(super) fn zoomed(&self, model: &CameraModel, time_s: f64) -> Option<CameraModel> {
         let zooms = self.faults.iter().filter(|fault| fault.kind == FaultKind::Zoom && acts_at(fault, time_s));
         let factor = |fault: &Fault| fault.focal_factor(time_s - fault.since_s.unwrap_or(0.0));

@@ -93,7 +93,7 @@ pub(super) fn estimated_lens(run: &DiagnosedRun<'_>, changes: &ForkChanges, resu
     let column = |quantity| value(result, ParameterPart::Camera(0), quantity);
     let ratio = 0.5 * (column(Quantity::Fx)? / fx + column(Quantity::Fy)? / fy);
     let known: f64 = changes.corrections.iter().map(|fault| fault.lens().focal).product();
-    // Corrected pixels are those of the rig's camera: their errors are smaller by the factor.
+    // Corrected pixels have the scale of the rig's camera: their errors are smaller by the factor.
     let centre = [(column(Quantity::Cx)? - cx) / fx, (column(Quantity::Cy)? - cy) / fy];
     Some([known * ratio, known * centre[0], known * centre[1]])
 }

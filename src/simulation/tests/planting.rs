@@ -71,7 +71,7 @@ fn a_fault_begins_at_its_time() {
     let (_, frames) = recorded(&["fault=offset:yaw:20deg@0.6"], folder.path());
     for (sound, frame) in sound.iter().zip(&frames) {
         let [sound_rad, rad] = [sound, frame].map(|frame| frame.joint_angles.as_ref().unwrap().angles_rad[0]);
-        // Angles of an image are those of the readings around it.
+        // The angles of an image come from the readings around it.
         match frame.stamp_ns {
             ..550_000_000 => assert_eq!(rad, sound_rad),
             650_000_000.. => assert!((rad - sound_rad + 20_f64.to_radians()).abs() < 1e-9, "{rad} {sound_rad}"),
