@@ -33,6 +33,11 @@ pub(crate) struct EstimationArguments {
     /// Lever arm of the antenna whose positions are the ground truth: X,Y,Z in metres in the IMU frame, or estimate.
     #[arg(long, value_name = "X,Y,Z|estimate", value_parser = lever_arm, allow_hyphen_values = true)]
     pub lever_arm: Option<LeverArm>,
+    /// Compare the calibration with this accuracy instead of the rig's (or 5 mm and 0.1°):
+    /// translation=5mm,rotation=0.1deg,NAME=VALUE with the name of a parameter as in the calibration table; without a
+    /// value the rig's. 'run' then ends with exit code 7 if a run is not trusted or does not reach it.
+    #[arg(long, value_name = "KEY=VALUE,…", num_args = 0..=1, require_equals = true, default_missing_value = "")]
+    pub require: Option<String>,
     /// Skip this many seconds at the start of the log.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = seconds)]
     pub start: f64,
@@ -77,7 +82,7 @@ impl EstimationArguments {
     /// Checks that no argument replaces what a saved session contains.
     ///
     /// # Errors
-    /// If runs, or the calibration of earlier flights, are given.
+    /// If runs, the calibration of earlier flights or the required accuracy are given.
     #[cfg(feature = "gui")]
     pub(crate) fn check_for_session(&self) -> Result<()> {
         if !self.runs.is_empty() {
@@ -85,6 +90,9 @@ impl EstimationArguments {
         }
         if self.prior.prior.is_some() {
             anyhow::bail!("a saved session contains the prior of its runs: leave --prior out");
+        }
+        if self.require.is_some() {
+            anyhow::bail!("a saved session contains the required accuracy: leave --require out");
         }
         Ok(())
     }
@@ -104,6 +112,7 @@ impl EstimationArguments {
             trajectories: self.trajectories.clone(),
             truth_trajectory: self.truth_trajectory.clone(),
             lever_arm: self.lever_arm,
+            required_accuracy: self.require.clone(),
             start_s: self.start,
             duration_s: self.duration,
             limits: self.limits.limits(),

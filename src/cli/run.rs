@@ -142,7 +142,14 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitOutcome> {
     if hit.is_some() {
         return Ok(ExitOutcome::BreakHit);
     }
-    Ok(if recording.runs.iter().all(is_initialized) { ExitOutcome::Success } else { ExitOutcome::NeverInitialized })
+    let is_required = arguments.estimation.require.is_some();
+    Ok(if !recording.runs.iter().all(is_initialized) {
+        ExitOutcome::NeverInitialized
+    } else if is_required && !summaries.iter().all(|(_, summary)| summary.answer.meets_requirement()) {
+        ExitOutcome::RequirementNotMet
+    } else {
+        ExitOutcome::Success
+    })
 }
 
 /// Notice about the computed part of an interrupted command.

@@ -166,7 +166,7 @@ impl<'a> PanelContext<'a> {
 
     /// Calibration table of a run over the whole flight.
     pub(crate) fn flight(&self, ui: &Ui, run: &RunRecord) -> FlightReport {
-        self.selection.flight.report(ui.ctx(), self.recording, run)
+        self.selection.flight.report(ui.ctx(), self.recording, run, &self.answer(run))
     }
 
     /// Answer of a run: trust, cause and required accuracy.

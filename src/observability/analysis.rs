@@ -11,6 +11,7 @@ use crate::gimbal::{Chain, ParameterId};
 use super::classification::{classify, tolerance};
 use super::directions::weak_directions;
 use super::elimination::{column_norms, project_out};
+use super::flight_sigmas::sigmas_without_prior;
 use super::structure::{Measured, known_losses};
 use super::{PackedFactor, RankReport};
 
@@ -92,12 +93,14 @@ pub fn analyse_with_scaling<A: AsRef<[f64]>>(
     let losses = known_losses(&linearization.chain, joints_free);
     let kept = kept_columns(&linearization.chain, fixed_parameters);
     let rig_prior = linearization.prior_jacobian.view((0, 0), (linearization.rig_prior_rows, columns));
+    let rig_prior = scaled(rig_prior.into_owned(), &scale);
+    let flight_sigmas = sigmas_without_prior(&with_priors, &rig_prior, &DMatrix::from_diagonal(&scale));
     let measured = Measured {
         scale: &scale,
         block: &block,
         null_space,
         with_priors: &with_priors,
-        rig_prior: &scaled(rig_prior.into_owned(), &scale),
+        rig_prior: &rig_prior,
         reference,
         structural_threshold,
     };
@@ -109,6 +112,7 @@ pub fn analyse_with_scaling<A: AsRef<[f64]>>(
         singular_values,
         singular_values_with_priors: dense::singular_values(&with_priors)?,
         posterior: PackedFactor::new(&with_priors),
+        flight_sigmas,
         reference,
         structural_threshold,
         informed_threshold: INFORMED_THRESHOLD,

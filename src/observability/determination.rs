@@ -5,26 +5,25 @@ use serde::{Serialize, Serializer};
 use crate::table::{Medium, Tone};
 use crate::text::Named;
 
-/// Ratio of posterior and prior σ below which a parameter is determined: nine tenths of its information come from the
-/// flight.
-pub const DETERMINED_RATIO: f64 = 0.3;
-/// Ratio from which a flight does not determine a parameter: it contributes less than a quarter of the prior's
-/// information.
-pub const NOT_DETERMINED_RATIO: f64 = 0.9;
+/// Largest ratio of a weakly determined parameter's σ and the required accuracy.
+pub const WEAKLY_DETERMINED_RATIO: f64 = 3.0;
 
-/// Verdict on a calibration parameter from its posterior and prior σ, the same in window, report and files.
+/// Verdict on a calibration parameter from its σ and the required accuracy, the same in window, report and files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Determination {
-    /// The posterior σ is below [`DETERMINED_RATIO`] of the prior σ.
+    /// The measurements of the flight alone reach the required accuracy; the prior of the rig has no effect.
     Determined,
-    /// The posterior σ is below [`NOT_DETERMINED_RATIO`] of the prior σ.
+    /// Measurements and prior together reach the required accuracy.
+    Given,
+    /// With the prior, σ is at most [`WEAKLY_DETERMINED_RATIO`] times the required accuracy.
     WeaklyDetermined,
-    /// The prior determines the value.
     NotDetermined,
-    /// The parameterization has other parameters for the same motion, and σ is not below [`DETERMINED_RATIO`].
+    /// The parameterization has other parameters for the same motion.
     Redundant,
     /// Not estimated: the value of the rig is kept.
     Fixed,
+    /// Withheld: the run is not trusted.
+    Unknown,
     /// Without a posterior: the run has not initialized.
     Initializing,
 }
@@ -32,10 +31,12 @@ pub enum Determination {
 impl Named for Determination {
     const NAMES: &'static [(Self, &'static str)] = &[
         (Self::Determined, "determined"),
+        (Self::Given, "given"),
         (Self::WeaklyDetermined, "weakly determined"),
         (Self::NotDetermined, "not determined"),
         (Self::Redundant, "redundant"),
         (Self::Fixed, "fixed"),
+        (Self::Unknown, "unknown"),
         (Self::Initializing, "initializing"),
     ];
 }
@@ -47,25 +48,33 @@ impl Serialize for Determination {
 }
 
 impl Determination {
-    /// Both numbers of the scale in words.
-    pub const RULE: &'static str = "determined: σ below 0.3 of the prior σ; weakly determined: below 0.9; not determined: \
-                                    from 0.9 on; redundant: by the parameterization";
+    /// The scale in words.
+    pub const RULE: &'static str = "determined: the measurements of the flight alone reach the required accuracy; given: \
+                                    only together with the rig's prior; weakly determined: together up to 3 times the \
+                                    required accuracy; not determined: more; redundant: by the parameterization; unknown: \
+                                    the run is not trusted";
 
-    /// Verdict on a posterior σ and a prior σ of one unit; NaN before the first solve. A parameter without a finite prior
-    /// is determined as soon as its σ is finite.
-    pub fn of(sigma: f64, prior_sigma: f64, redundant: bool) -> Self {
-        let ratio = sigma / prior_sigma;
+    /// Verdict on the posterior σ, the σ by the measurements alone and the required accuracy of one unit; NaN before the
+    /// first solve.
+    pub fn of(sigma: f64, flight_sigma: f64, required: f64, redundant: bool) -> Self {
         if !sigma.is_finite() {
             Self::Initializing
-        } else if !prior_sigma.is_finite() || ratio < DETERMINED_RATIO {
-            Self::Determined
         } else if redundant {
             Self::Redundant
-        } else if ratio < NOT_DETERMINED_RATIO {
+        } else if flight_sigma <= required {
+            Self::Determined
+        } else if sigma <= required {
+            Self::Given
+        } else if sigma <= WEAKLY_DETERMINED_RATIO * required {
             Self::WeaklyDetermined
         } else {
             Self::NotDetermined
         }
+    }
+
+    /// True if the parameter is as accurate as required.
+    pub fn is_met(self) -> bool {
+        matches!(self, Self::Determined | Self::Given)
     }
 
     /// True if motion or further sensors can improve the parameter.
@@ -73,12 +82,14 @@ impl Determination {
         matches!(self, Self::WeaklyDetermined | Self::NotDetermined)
     }
 
-    /// Severity of the verdict: largest for a parameter that the flight does not determine.
+    /// Severity of the verdict: largest for a parameter that is not determined.
     pub fn severity(self) -> u8 {
         match self {
-            Self::NotDetermined => 5,
-            Self::WeaklyDetermined => 4,
-            Self::Redundant => 3,
+            Self::NotDetermined => 7,
+            Self::WeaklyDetermined => 6,
+            Self::Unknown => 5,
+            Self::Redundant => 4,
+            Self::Given => 3,
             Self::Determined => 2,
             Self::Fixed => 1,
             Self::Initializing => 0,
@@ -89,10 +100,12 @@ impl Determination {
     pub const fn look(self) -> (&'static str, Tone) {
         match self {
             Self::Determined => ("✔", Tone::Good),
+            Self::Given => ("●", Tone::Accent),
             Self::WeaklyDetermined => ("⚠", Tone::Caution),
             Self::NotDetermined => ("✖", Tone::Bad),
             Self::Redundant => ("=", Tone::Weak),
             Self::Fixed => ("–", Tone::Weak),
+            Self::Unknown => ("?", Tone::Weak),
             Self::Initializing => ("…", Tone::Weak),
         }
     }
@@ -143,18 +156,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn two_ratios_separate_three_words() {
-        let of = |ratio: f64, redundant| Determination::of(0.002 * ratio, 0.002, redundant);
-        assert_eq!(of(0.299, false), Determination::Determined);
-        assert_eq!(of(0.301, false), Determination::WeaklyDetermined);
-        assert_eq!(of(0.899, false), Determination::WeaklyDetermined);
-        assert_eq!(of(0.901, false), Determination::NotDetermined);
-        assert_eq!(of(0.71, true), Determination::Redundant);
-        assert_eq!(of(0.2, true), Determination::Determined);
-        assert_eq!(of(f64::NAN, true), Determination::Initializing);
-        assert_eq!(Determination::of(0.002, f64::NAN, false), Determination::Determined);
-        for ratio in [DETERMINED_RATIO, NOT_DETERMINED_RATIO] {
-            assert!(Determination::RULE.contains(&ratio.to_string()), "{ratio}");
-        }
+    fn the_flight_alone_determines_and_the_prior_gives() {
+        let required = 0.002;
+        let of = |ratio: f64, alone: f64| Determination::of(required * ratio, required * alone, required, false);
+        assert_eq!(of(0.9, 0.99), Determination::Determined);
+        assert_eq!(of(0.9, 1.01), Determination::Given);
+        assert_eq!(of(0.9, f64::INFINITY), Determination::Given);
+        assert_eq!(of(1.01, f64::INFINITY), Determination::WeaklyDetermined);
+        assert_eq!(of(2.99, 3.5), Determination::WeaklyDetermined);
+        assert_eq!(of(3.01, 3.5), Determination::NotDetermined);
+        assert_eq!(Determination::of(0.001, f64::INFINITY, required, true), Determination::Redundant);
+        assert_eq!(Determination::of(f64::NAN, 0.001, required, true), Determination::Initializing);
+        assert!(Determination::RULE.contains(&format!("up to {WEAKLY_DETERMINED_RATIO} times")));
+        let met = Determination::all().filter(|verdict| verdict.is_met());
+        assert_eq!(met.collect::<Vec<_>>(), [Determination::Determined, Determination::Given]);
     }
 }

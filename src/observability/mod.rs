@@ -15,6 +15,7 @@ mod direction_words;
 mod directions;
 mod elimination;
 mod factor;
+mod flight_sigmas;
 mod information;
 pub mod laboratory;
 mod parameter_state;
@@ -30,7 +31,7 @@ mod tests;
 
 pub use analysis::{ScalingRule, analyse, analyse_with_scaling};
 pub use correlation::Correlations;
-pub use determination::{DETERMINED_RATIO, Determination, LossCause, NOT_DETERMINED_RATIO};
+pub use determination::{Determination, LossCause, WEAKLY_DETERMINED_RATIO};
 pub use direction_words::{parameters_of, parameters_of_weights};
 pub use factor::PackedFactor;
 pub use information::{InformationRate, ParameterRate, information_rate};

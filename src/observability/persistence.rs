@@ -73,6 +73,7 @@ mod tests {
             known: Vec::new(),
             joint_count: 0,
             posterior: PackedFactor::default(),
+            flight_sigmas: Vec::new(),
         }
     }
 

@@ -40,6 +40,9 @@ pub struct RankReport {
     pub joint_count: usize,
     /// Posterior information of the calibration after the step, priors included, columns in units of the scale.
     pub posterior: PackedFactor,
+    /// Standard deviations by the measurements alone, the rig's prior taken out of the posterior information, one per
+    /// column in the unit of its dimension; infinite where the prior alone determines a parameter.
+    pub flight_sigmas: Vec<f64>,
 }
 
 /// Number of unobservable columns by cause.
@@ -95,6 +98,13 @@ impl RankReport {
         parts.join("; ")
     }
 
+    /// Standard deviation of a parameter by the measurements alone, in the unit of its dimension; infinite for a parameter
+    /// without a column.
+    pub fn flight_sigma(&self, parameter: ParameterId) -> f64 {
+        let column = self.parameters.iter().position(|known| *known == parameter);
+        column.and_then(|column| self.flight_sigmas.get(column)).copied().unwrap_or(f64::INFINITY)
+    }
+
     pub fn heap_bytes(&self) -> usize {
         let weights = self.directions.iter().map(|direction| of_vec(&direction.weights)).sum::<usize>();
         weights
@@ -105,6 +115,7 @@ impl RankReport {
             + of_vec(&self.singular_values_with_priors)
             + of_vec(&self.directions)
             + of_vec(&self.known)
+            + of_vec(&self.flight_sigmas)
             + self.posterior.heap_bytes()
     }
 

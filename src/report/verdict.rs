@@ -7,6 +7,7 @@ use crate::geometry::{Dimension, seconds_from_ns};
 use crate::log_check::{CheckReport, Severity};
 use crate::observability::laboratory::{Situation, advise};
 use crate::observability::{Determination, RankReport, parameters_of};
+use crate::sensors::RequiredAccuracy;
 use crate::session::{
     FlightParameter, LostSince, PoseError, Recording, RunRecord, RunSummary, StepRecord, flight_headline,
     least_determined, run_warning_lines,
@@ -51,7 +52,7 @@ pub(super) struct RunVerdict {
 impl RunVerdict {
     pub(super) fn new(recording: &Recording, run: &RunRecord, summary: &RunSummary) -> Self {
         let mut statements = vec![accuracy(recording, run, summary)];
-        statements.push(calibration(summary));
+        statements.push(calibration(summary, &recording.rig.required_accuracy));
         statements.extend(observability(recording, run));
         statements.push(estimation(run, summary));
         Self { statements }
@@ -121,15 +122,18 @@ fn accuracy(recording: &Recording, run: &RunRecord, summary: &RunSummary) -> Sta
 }
 
 /// Verdicts of the flight on the parameters, with the reason for the least determined one.
-fn calibration(summary: &RunSummary) -> Statement {
+fn calibration(summary: &RunSummary, required: &RequiredAccuracy) -> Statement {
     let parameters = &summary.calibration.estimability;
     let estimated = summary.frames.estimated > 0;
     if parameters.is_empty() || !estimated {
         let text = if estimated { "Calibration fixed at the values of the rig." } else { "Not calibrated." };
         return statement("Calibration", StatementLevel::Note, text.to_owned(), Vec::new());
     }
-    let all = parameters.iter().all(|parameter| parameter.verdict == Determination::Determined);
-    let text = format!("{}, from the whole flight.", flight_headline(parameters));
+    let meets =
+        |verdict: Determination| verdict.is_met() || matches!(verdict, Determination::Redundant | Determination::Fixed);
+    let all = parameters.iter().all(|parameter| meets(parameter.verdict));
+    let required = required.text_for(parameters.iter().map(|parameter| parameter.parameter));
+    let text = format!("{}, from the whole flight; required: {required}.", flight_headline(parameters));
     let mut details = Vec::new();
     if let Some(least) = least_determined(parameters) {
         details.push(format!("Least determined: {}, {}.", with_sigma(least), least.verdict_text()));

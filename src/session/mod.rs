@@ -53,9 +53,9 @@ pub use record::{
     PoseConsistency, PoseError, PositionTruth, RELATIVE_LENGTHS_M, RankColumn, Recording, RelativeAccuracy,
     ResidualSum, RunMemory, RunRecord, RunWarning, SolverPosition, SolverTrace, StepColumn, StepFactorRows, StepRecord,
     TrajectoryAccuracy, TrajectoryEvaluation, TrajectoryLane, WarningLine, evaluate_trajectory, flight_advice,
-    flight_headline, flight_table, least_determined, log_warning_lines, run_warning_lines, warning_lines,
+    flight_headline, least_determined, log_warning_lines, run_warning_lines, warning_lines,
 };
 pub use result::{
     Answer, FindingSource, RankSummary, Requirement, RunFinding, RunSummary, StageSummary, TimingSummary,
-    TruthAgreement, summarize,
+    TruthAgreement, Withheld, flight_table, summarize,
 };

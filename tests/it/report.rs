@@ -49,16 +49,23 @@ fn check_verdict(page: &str, report: &Value) {
             assert_eq!(rows.matches(&named).count(), 1, "{named} in {rows}");
             let reason = parameter["reason"].as_str().expect("a text");
             assert!(rows.contains(&reason.replace('<', "&lt;")), "{reason} in {rows}");
-            let ratio = parameter["ratio"].as_f64().expect("a number");
-            let by_ratio = match ratio {
-                ..0.3 => "determined",
-                0.3..0.9 => "weakly determined",
-                _ => "not determined",
+            let number = |key: &str| parameter[key].as_f64();
+            let (sigma, required) = (number("sigma").expect("a number"), number("required").expect("a number"));
+            let by_sigma = if number("flight_sigma").is_some_and(|alone| alone <= required) {
+                "determined"
+            } else if sigma <= required {
+                "given"
+            } else if sigma <= 3.0 * required {
+                "weakly determined"
+            } else {
+                "not determined"
             };
+            assert!(number("flight_sigma").is_none_or(|alone| alone >= 0.999 * sigma), "{parameter}");
             let verdict = parameter["verdict"].as_str().expect("a text");
-            assert!(verdict == by_ratio || verdict == "redundant" && ratio >= 0.3, "{parameter}");
-            assert_eq!(verdict == "determined", parameter["cause"].is_null(), "{parameter}");
-            assert_eq!(verdict == "determined", parameter["reason"] == "", "{parameter}");
+            assert!(verdict == by_sigma || verdict == "redundant" && by_sigma != "determined", "{parameter}");
+            let is_met = ["determined", "given"].contains(&verdict);
+            assert_eq!(is_met, parameter["cause"].is_null(), "{parameter}");
+            assert_eq!(is_met, parameter["reason"] == "", "{parameter}");
             assert!(parameter["since_s"].as_f64().expect("a number") > 0.0, "{parameter}");
         }
         let redundant = parameters.iter().filter(|parameter| parameter["verdict"] == "redundant").count();

@@ -179,7 +179,6 @@ fn check_root(document: &Located, found: &mut Found) {
             "imu1" if value.get("mount").is_some() => check_imu(value, key, &GIMBAL_IMU, found),
             "gimbal" => check_gimbal(value, found),
             "ground_truth" => check_mapping(value, key, &GROUND_TRUTH, found),
-            "required_accuracy" => check_mapping(value, key, &REQUIRED_ACCURACY, found),
             key if is_numbered(key, "cam") => check_camera(value, key, found),
             // Kalibr's files may have several IMUs on the vehicle, of which the first is used.
             key if is_numbered(key, "imu") => found.unused.push(key.to_owned()),

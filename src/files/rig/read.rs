@@ -7,7 +7,7 @@ use super::mask;
 use super::sensor;
 use crate::camera::{CameraError, CameraModel};
 use crate::files::FileError;
-use crate::gimbal::{ClassicalChain, InverseChain};
+use crate::gimbal::{ClassicalChain, InverseChain, ParameterNames};
 use crate::sensors::{
     AssumedField, CameraMount, CameraRig, ChainPrior, GimbalImuRig, GimbalRig, ImuNoise, ImuRig, Joint, LeverArm,
     MAX_LEVER_ARM_M, RequiredAccuracy, Rig,
@@ -59,9 +59,8 @@ pub(crate) fn read_rig(root: &Field<'_>, default_name: &str, facts: &dyn CameraF
     let ground_truth_topic = ground_truth_topic.map(|topic| topic.text("a topic").map(str::to_owned)).transpose()?;
     let ground_truth_use_log_time = root.field("ground_truth").field("use_log_time").flag()?;
     let ground_truth_lever_arm = read_lever_arm(root.field("ground_truth").field("lever_arm"))?;
-    let required_accuracy = read_required_accuracy(&root.field("required_accuracy"))?;
     let assumed = read_assumed(root)?;
-    Ok(Rig {
+    let mut rig = Rig {
         name,
         gravity_m_per_s2,
         imu,
@@ -71,9 +70,11 @@ pub(crate) fn read_rig(root: &Field<'_>, default_name: &str, facts: &dyn CameraF
         ground_truth_topic,
         ground_truth_use_log_time,
         ground_truth_lever_arm,
-        required_accuracy,
+        required_accuracy: RequiredAccuracy::default(),
         assumed,
-    })
+    };
+    rig.required_accuracy = read_required_accuracy(root.field("required_accuracy"), &rig.parameter_names())?;
+    Ok(rig)
 }
 
 /// Reads the position of the ground-truth antenna.
@@ -91,15 +92,17 @@ fn read_lever_arm(field: Field<'_>) -> Result<Option<LeverArm>, FileError> {
 }
 
 /// Reads the accuracy that the calibration must reach; the defaults stand for values that are not given.
-fn read_required_accuracy(field: &Field<'_>) -> Result<RequiredAccuracy, FileError> {
-    let given = |key: &str, expected: &str, default: f64| {
-        field.field(key).optional().map_or(Ok(default), |value| value.positive(expected))
-    };
-    let defaults = RequiredAccuracy::default();
-    Ok(RequiredAccuracy {
-        translation_m: given("translation", "a standard deviation in metres", defaults.translation_m)?,
-        rotation_rad: given("rotation", "a standard deviation in radians", defaults.rotation_rad)?,
-    })
+fn read_required_accuracy(field: Field<'_>, names: &ParameterNames) -> Result<RequiredAccuracy, FileError> {
+    let mut required = RequiredAccuracy::default();
+    let Some(given) = field.optional() else { return Ok(required) };
+    for key in given.keys("a mapping of translation, rotation or parameters to standard deviations")? {
+        let of_key = given.field(key);
+        let unit = RequiredAccuracy::dimension_of(key, names).map_err(|problem| of_key.error(problem))?.unit();
+        let unit = if unit.is_empty() { String::new() } else { format!(" in {unit}") };
+        let sigma = of_key.positive(&format!("a standard deviation{unit}"))?;
+        required.set(key, sigma, names).map_err(|problem| of_key.error(problem))?;
+    }
+    Ok(required)
 }
 
 /// Reads the assumed fields; an error if the rig lacks one of them.

@@ -385,6 +385,29 @@ fn an_unknown_key_is_named_with_the_nearest_known_one() {
 }
 
 #[test]
+fn a_required_accuracy_is_read_and_written_and_a_wrong_one_has_its_line() {
+    let with = |values: &str| RIG.replace("gravity: 9.81", &format!("gravity: 9.81\nrequired_accuracy: {{{values}}}"));
+    let rig = parse(&with("translation: 0.01, yaw.a: 0.002, timeshift: 3.0e-3")).unwrap();
+    let names = rig.parameter_names();
+    let of = |name: &str| rig.required_accuracy.of(names.parse(name).unwrap());
+    assert_eq!([of("yaw.d"), of("yaw.a"), of("timeshift")], [0.01, 0.002, 0.003]);
+    assert_eq!(of("yaw.alpha"), 0.1_f64.to_radians());
+    assert_eq!(parse(&rig.to_yaml()).unwrap().required_accuracy, rig.required_accuracy);
+    let line = with("").lines().position(|line| line.starts_with("required_accuracy")).unwrap() + 1;
+    for (values, expected) in [
+        ("translation: 0", "required_accuracy.translation: holds 0, expected a standard deviation in m"),
+        ("rotation: -0.1", "required_accuracy.rotation: holds -0.1, expected a standard deviation in rad"),
+        ("rotation: 1e999", "the rig is not valid YAML: line "),
+        ("yaw.a: nan", "required_accuracy.yaw.a: holds"),
+        ("yaw.alpha: []", "required_accuracy.yaw.alpha: holds"),
+        ("roll.a: 0.1", "required_accuracy.roll.a: 'roll.a' is no parameter, expected translation, rotation or a"),
+    ] {
+        let message = parse(&with(values)).unwrap_err();
+        assert!(message.starts_with(expected) && message.contains(&format!("line {line}")), "{message}\n{expected}");
+    }
+}
+
+#[test]
 fn angles_in_degrees_are_named_with_their_radians() {
     let cases = [
         (

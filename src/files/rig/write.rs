@@ -68,10 +68,14 @@ impl Rig {
             None => {}
         }
         if self.required_accuracy != RequiredAccuracy::default() {
-            let RequiredAccuracy { translation_m, rotation_rad } = self.required_accuracy;
+            let RequiredAccuracy { translation_m, rotation_rad, parameters } = &self.required_accuracy;
+            let names = self.parameter_names();
             line(&mut out, 0, "required_accuracy", "");
-            line(&mut out, 1, "translation", &number(translation_m));
-            line(&mut out, 1, "rotation", &number(rotation_rad));
+            line(&mut out, 1, "translation", &number(*translation_m));
+            line(&mut out, 1, "rotation", &number(*rotation_rad));
+            for (parameter, sigma) in parameters {
+                line(&mut out, 1, &text(&names.name(*parameter)), &number(*sigma));
+            }
         }
         if !self.assumed.is_empty() {
             line(&mut out, 0, "assumed", "");

@@ -3,7 +3,7 @@
 #[cfg(test)]
 mod tests;
 
-use egui::{RichText, ScrollArea, TextEdit, Ui};
+use egui::{DragValue, RichText, ScrollArea, TextEdit, Ui};
 
 use super::derived::flight::FlightReport;
 use super::parameter_names::{meaning_of, place_of};
@@ -13,6 +13,7 @@ use super::{CsvTable, Panel, PanelContext};
 use crate::geometry::seconds_from_ns;
 use crate::gui::units::fixed;
 use crate::observability::Determination;
+use crate::sensors::RequiredAccuracy;
 use crate::session::{CalibrationRow, Command, FlightParameter, Recording, RunRecord, flight_headline, flight_table};
 use crate::table::csv;
 
@@ -27,12 +28,14 @@ const SCROLL_BAR: f32 = 10.0;
 pub struct CalibrationPanel {
     filter: String,
     order: TableOrder,
+    /// Accuracy that is being entered.
+    entered: Option<RequiredAccuracy>,
 }
 
 impl Default for CalibrationPanel {
     /// At first the worst verdict is on top.
     fn default() -> Self {
-        Self { filter: String::new(), order: TableOrder::descending("Verdict") }
+        Self { filter: String::new(), order: TableOrder::descending("Verdict"), entered: None }
     }
 }
 
@@ -71,8 +74,15 @@ impl Panel for CalibrationPanel {
 }
 
 impl CalibrationPanel {
-    /// Draws the headline of the flight, and the field that filters the rows.
-    fn bar_ui(&mut self, ui: &mut Ui, ctx: &PanelContext<'_>, number: usize, run: &RunRecord, report: &FlightReport) {
+    /// Draws the headline of the flight, and the fields of the required accuracy and of the filter.
+    fn bar_ui(
+        &mut self,
+        ui: &mut Ui,
+        ctx: &mut PanelContext<'_>,
+        number: usize,
+        run: &RunRecord,
+        report: &FlightReport,
+    ) {
         const FILTER_WIDTH: f32 = 120.0;
         ui.horizontal_wrapped(|ui| {
             let several = ctx.recording.runs.len() > 1;
@@ -82,14 +92,46 @@ impl CalibrationPanel {
             }
             ui.label(RichText::new(span_text(ctx.recording, run)).color(ctx.theme.text_weak));
             let headline = RichText::new(flight_headline(&report.rows)).color(ctx.theme.text_strong);
-            ui.label(headline).on_hover_text(Determination::RULE);
+            ui.label(headline).on_hover_text(rule(ctx, &report.rows));
             if !ctx.presentation.is_figure() {
+                self.required_ui(ui, ctx);
                 let field = TextEdit::singleline(&mut self.filter).hint_text("Filter").desired_width(FILTER_WIDTH);
                 let response = ui.add(field).on_hover_text("Rows that contain this text, such as weak or pitch");
                 response
                     .widget_info(|| egui::WidgetInfo::labeled(egui::Role::TextInput, true, "Filter the parameters"));
             }
         });
+    }
+
+    /// Draws fields for the required accuracy of lengths and angles; it is compared when a field is left.
+    fn required_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
+        let mut required = self.entered.take().unwrap_or_else(|| ctx.recording.rig.required_accuracy.clone());
+        let [mut length_mm, mut angle_deg] = [1e3 * required.translation_m, required.rotation_rad.to_degrees()];
+        let fields = [
+            (
+                &mut length_mm,
+                0.01..=1e3,
+                " mm",
+                "Required accuracy of lengths: σ with which they are known well enough",
+            ),
+            (&mut angle_deg, 0.001..=90.0, "°", "Required accuracy of angles: σ with which they are known well enough"),
+        ];
+        ui.label(RichText::new("Required").color(ctx.theme.text_weak));
+        let (mut is_left, mut is_used) = (false, false);
+        for (value, range, unit, meaning) in fields {
+            let speed = 0.02 * *value;
+            let response = ui.add(DragValue::new(value).range(range).speed(speed).max_decimals(3).suffix(unit));
+            response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::SpinButton, true, meaning));
+            is_left |= response.drag_stopped() || response.lost_focus();
+            is_used |= response.dragged() || response.has_focus();
+            response.on_hover_text(meaning);
+        }
+        (required.translation_m, required.rotation_rad) = (1e-3 * length_mm, angle_deg.to_radians());
+        if is_left && required != ctx.recording.rig.required_accuracy {
+            ctx.commands.push(Command::RequireAccuracy(required));
+        } else if is_used {
+            self.entered = Some(required);
+        }
     }
 
     /// Draws the rows that contain the text of the filter; a click goes to the start of a verdict.
@@ -121,6 +163,12 @@ impl CalibrationPanel {
         let since_ns = clicked.and_then(|row| row.flight.since_ns);
         ctx.commands.extend(since_ns.map(|stamp_ns| Command::Seek { stamp_ns }));
     }
+}
+
+/// Scale of the verdicts with the required accuracy of some parameters.
+pub(super) fn rule(ctx: &PanelContext<'_>, rows: &[FlightParameter]) -> String {
+    let required = ctx.recording.rig.required_accuracy.text_for(rows.iter().map(|row| row.parameter));
+    format!("Required: {required}. {}", Determination::RULE)
 }
 
 /// Interval of the verdicts: the whole flight, or its computed part.

@@ -98,3 +98,31 @@ fn rows_are_sorted_and_filtered() {
     harness.run_steps(2);
     assert!(harness.query_by_label("No parameter contains this text").is_some());
 }
+
+#[test]
+fn a_required_accuracy_is_compared_when_its_field_is_left() {
+    let mut harness = bench(sample_recording(), [1366.0, 900.0]);
+    let field = "Required accuracy of lengths: σ with which they are known well enough";
+    harness.get_by_label(field).focus();
+    harness.run_steps(2);
+    harness.key_press(egui::Key::ArrowUp);
+    harness.run_steps(2);
+    assert_eq!(harness.state().commands, [], "not before the field is left");
+    harness.key_press(egui::Key::Tab);
+    harness.run_steps(2);
+    let [Command::RequireAccuracy(required)] = &harness.state().commands[..] else {
+        panic!("{:?}", harness.state().commands)
+    };
+    let before = harness.state().recording.rig.required_accuracy.clone();
+    assert!(required.translation_m > before.translation_m && required.translation_m < 2.0 * before.translation_m);
+    assert_eq!(required.rotation_rad, before.rotation_rad);
+    // The verdicts follow.
+    let met = |recording: &Recording| {
+        flight_table(recording, &recording.runs[0]).iter().filter(|row| row.verdict.is_met()).count()
+    };
+    let mut recording = harness.state().recording.clone();
+    let with_default = met(&recording);
+    std::sync::Arc::make_mut(&mut recording.rig).required_accuracy.translation_m = 10.0;
+    std::sync::Arc::make_mut(&mut recording.rig).required_accuracy.rotation_rad = 10.0;
+    assert!(met(&recording) > with_default, "{with_default}");
+}

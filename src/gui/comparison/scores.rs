@@ -5,7 +5,7 @@ use crate::estimator::Phase;
 use crate::geometry::seconds_from_ns;
 use crate::gui::units::{fixed, significant};
 use crate::observability::Determination;
-use crate::session::{RELATIVE_LENGTHS_M, Recording, RunRecord, TrajectoryAccuracy, TrajectoryLane};
+use crate::session::{Answer, RELATIVE_LENGTHS_M, Recording, RunRecord, TrajectoryAccuracy, TrajectoryLane};
 
 /// Number of new steps after which a run's accuracy is recomputed.
 const UPDATE_PERIOD_STEPS: usize = 20;
@@ -196,7 +196,7 @@ impl Scores {
             count("calibration columns", "Estimated calibration parameters of the last step", |score| score.columns),
             count(
                 "determined parameters",
-                "Parameters that the whole flight determines: σ below 0.3 of the prior σ",
+                "Parameters that reach the required accuracy by the measurements of the flight alone; none for a run that is not trusted",
                 |score| score.determined,
             ),
             count("informed rank at the end", "Informed rank of the last step with a calibration", |score| {
@@ -252,8 +252,8 @@ impl RunScore {
             initialized_s: first.map(|step| seconds_from_ns(step.report.stamp_ns)),
             restarts: Some(last.map_or(0, |last| last.report.restarts)),
             columns: Some(last.map_or(0, |last| last.report.calibration.parameters.len())),
-            determined: last.map(|last| {
-                let verdicts = last.determinations();
+            determined: last.filter(|_| Answer::of_run(recording, run).withheld().is_none()).map(|last| {
+                let verdicts = last.determinations(&recording.rig.required_accuracy);
                 verdicts.iter().filter(|(_, verdict)| *verdict == Determination::Determined).count()
             }),
             informed: run.steps.iter().rev().find_map(|step| step.rank.as_ref()).map(|rank| rank.rank_informed),

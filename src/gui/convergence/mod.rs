@@ -187,6 +187,7 @@ impl ConvergencePanel {
             paint::legend(ui, ctx, rect);
         }
         let gutters = layout.time_gutters();
+        let verdicts = ctx.flight(ui, &ctx.recording.runs[shown]).history;
         for ((parameter, rect), below) in parameters.iter().zip(&layout.cells).zip(gutters) {
             if ui.is_rect_visible(*rect) {
                 let data = paint::PlotData {
@@ -194,6 +195,7 @@ impl ConvergencePanel {
                     converted: &self.converted,
                     ground_truth,
                     shown,
+                    verdicts: &verdicts,
                     wheel,
                 };
                 paint::cell_ui(ui, ctx, &data, &mut self.curves, *parameter, (*rect, below));

@@ -6,9 +6,8 @@ use crate::estimator::rigid_columns;
 use crate::gimbal::{NearestForm, ParameterId, Parameterization};
 use crate::gui::derived::chain_values::{ParameterValues, parameter_values, principal_values, unwrap_towards};
 use crate::gui::derived::follow::Follower;
-use crate::observability::Determination;
 use crate::sensors::Rig;
-use crate::session::{FlightVerdicts, RunRecord, StepRecord};
+use crate::session::{RunRecord, StepRecord};
 
 #[derive(Debug, Default)]
 pub(crate) struct ParameterCurve {
@@ -20,8 +19,6 @@ pub(crate) struct ParameterCurve {
     pub(crate) upper: Vec<f64>,
     /// Standard deviation by step.
     pub(crate) sigmas: Vec<f64>,
-    /// Verdict by step, from σ and prior σ.
-    pub(crate) verdicts: Vec<Determination>,
 }
 
 /// The calibration of one run over time.
@@ -35,7 +32,6 @@ pub(crate) struct CalibrationHistory {
     pub(crate) epoch: u64,
     /// Values of the last step, the reference for unwrapping angles.
     last: ParameterValues,
-    verdicts: FlightVerdicts,
 }
 
 impl CalibrationHistory {
@@ -46,11 +42,9 @@ impl CalibrationHistory {
             self.stamps_ns.clear();
             self.parameters.clear();
             self.last.clear();
-            self.verdicts = FlightVerdicts::default();
             self.epoch += 1;
         }
         for step in new_steps.steps {
-            self.verdicts.push(step);
             self.push(step);
         }
     }
@@ -59,7 +53,6 @@ impl CalibrationHistory {
         let calibration = &step.report.calibration;
         let row = self.stamps_ns.len();
         self.stamps_ns.push(step.report.stamp_ns);
-        let verdicts: BTreeMap<ParameterId, Determination> = self.verdicts.verdicts().collect();
         let mut values = principal_values(&calibration.parameters, &calibration.values);
         unwrap_towards(&mut values, &self.last);
         for (index, parameter) in calibration.parameters.iter().enumerate() {
@@ -76,7 +69,6 @@ impl CalibrationHistory {
             history.sigmas.push(sigma);
             history.lower.push(value - 3.0 * sigma);
             history.upper.push(value + 3.0 * sigma);
-            history.verdicts.push(verdicts.get(parameter).copied().unwrap_or(Determination::Initializing));
         }
         for (_, history) in &mut self.parameters {
             history.pad(row + 1);
@@ -165,7 +157,6 @@ impl ParameterCurve {
         for column in [&mut self.values, &mut self.sigmas, &mut self.lower, &mut self.upper] {
             column.resize(rows.max(column.len()), f64::NAN);
         }
-        self.verdicts.resize(rows.max(self.verdicts.len()), Determination::Initializing);
     }
 }
 
@@ -223,16 +214,5 @@ mod tests {
         let length = ParameterCurve { values: vec![-3.15], ..ParameterCurve::default() };
         assert!((length.unwrap_near(id("I.tx"), 3.13) - 3.13).abs() < 1e-12);
         assert_eq!(ParameterCurve::default().unwrap_near(id("I.rx"), 3.13), 3.13);
-    }
-
-    #[test]
-    fn the_classical_chain_has_redundant_parameters() {
-        let recording = sample_recording_of(first_tracked_frame() + 5, &["classical"]);
-        let mut history = CalibrationHistory::default();
-        history.read(&recording.runs[0]);
-        let last = history.stamps_ns.len() - 1;
-        let redundant = history.parameters.iter().filter(|(_, one)| one.verdicts[last] == Determination::Redundant);
-        assert!(redundant.count() > 5, "the classical chain is redundant");
-        assert!(history.parameters.iter().all(|(_, one)| one.verdicts[0] == Determination::Initializing));
     }
 }

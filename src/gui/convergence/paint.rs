@@ -10,6 +10,7 @@ use super::range::{paint_outside, value_range};
 use crate::gimbal::{ParameterId, Parameterization};
 use crate::gui::PanelContext;
 use crate::gui::derived::chain_values::ParameterValues;
+use crate::gui::derived::flight::DeterminationHistory;
 use crate::gui::determination::look_of;
 use crate::gui::help::terms::window;
 use crate::gui::parameter_names::{CalibrationPart, heading_of, meaning_of};
@@ -33,10 +34,12 @@ const SAMPLE_WIDTH: f32 = 26.0;
 const TITLE_HEIGHT: f32 = 15.0;
 
 /// Verdicts with a mark in the plots.
-pub(super) const MARKED: [Determination; 4] = [
+pub(super) const MARKED: [Determination; 6] = [
+    Determination::Given,
     Determination::WeaklyDetermined,
     Determination::NotDetermined,
     Determination::Redundant,
+    Determination::Unknown,
     Determination::Initializing,
 ];
 
@@ -112,9 +115,15 @@ fn legend_entries(ctx: &PanelContext<'_>, add_entry: &mut dyn FnMut(&str, PaintS
     let classical = ctx.recording.runs.iter().any(|run| {
         run.steps.last().is_some_and(|last| last.report.calibration.parameterization == Parameterization::Classical)
     });
-    for verdict in MARKED.into_iter().filter(|verdict| classical || *verdict != Determination::Redundant) {
+    let is_withheld = ctx.selected_run().is_some_and(|run| ctx.answer(run).withheld().is_some());
+    let occurs = |verdict: &Determination| match verdict {
+        Determination::Redundant => classical,
+        Determination::Unknown => is_withheld,
+        _ => true,
+    };
+    for verdict in MARKED.into_iter().filter(occurs) {
         add_entry(verdict.name(), &|painter, place| {
-            if verdict != Determination::WeaklyDetermined {
+            if is_hatched(verdict) {
                 paint_hatch(painter, place, theme.hatch);
             }
             let strip = Rect::from_min_max(pos2(place.left(), place.bottom() - STRIP_HEIGHT), place.max);
@@ -131,6 +140,8 @@ pub(super) struct PlotData<'a> {
     /// Ground-truth values in the shown run's parameterization.
     pub(super) ground_truth: &'a ParameterValues,
     pub(super) shown: usize,
+    /// Verdicts on the parameters of the shown run at its steps.
+    pub(super) verdicts: &'a DeterminationHistory,
     pub(super) wheel: Wheel,
 }
 
@@ -161,8 +172,9 @@ impl<'a> PlotData<'a> {
             curves.value.update(area, epoch, stamps_ns, values);
             if *run == self.shown {
                 curves.band.update(area, epoch, stamps_ns, &parameter.lower, &parameter.upper);
+                let (epoch, stamps_ns) = (self.verdicts.epoch, &self.verdicts.stamps_ns);
                 for (segments, verdict) in curves.verdicts.iter_mut().zip(MARKED) {
-                    segments.update(area, epoch, stamps_ns, |row| parameter.verdicts[row] == verdict);
+                    segments.update(area, epoch, stamps_ns, |row| self.verdicts.verdict(id, Some(row)) == verdict);
                 }
             }
         }
@@ -243,7 +255,7 @@ pub(super) fn cell_ui(
     painter.rect_stroke(plot, 0.0, border, StrokeKind::Inside);
 
     let row = history.row_at(ctx.cursor_ns);
-    let verdict = row.map_or(Determination::Initializing, |row| parameter.verdicts[row]);
+    let verdict = data.verdicts.verdict(id, data.verdicts.row_at(ctx.cursor_ns));
     let value = row.map(|row| (parameter.values[row], parameter.sigmas[row]));
     let shown_value = value.map(|(value, sigma)| (id.principal_value(value), sigma));
     title(&painter, ctx, rect, name, shown, shown_value, verdict, selected);
@@ -368,12 +380,17 @@ fn error_text(shown: Shown, error: f64, sigma: f64) -> String {
     if times.is_finite() { format!("{text} ({times:.1}σ)") } else { text }
 }
 
+/// True for a verdict in which the value is not worth much.
+fn is_hatched(verdict: Determination) -> bool {
+    !matches!(verdict, Determination::Given | Determination::WeaklyDetermined)
+}
+
 /// Hatches the ranges in which the flight has not determined the parameter; a strip at the bottom shows the verdict.
 fn paint_verdicts(painter: &Painter, theme: &Theme, area: &PlotArea, curves: &ParameterCurves) {
     for (segments, verdict) in curves.verdicts.iter().zip(MARKED) {
         for segment in segments.on_screen(area) {
             let segment = Rect::from_x_y_ranges(segment, area.rect.y_range());
-            if verdict != Determination::WeaklyDetermined {
+            if is_hatched(verdict) {
                 paint_hatch(painter, segment, theme.hatch);
             }
             let strip = Rect::from_min_max(pos2(segment.left(), segment.bottom() - STRIP_HEIGHT), segment.max);
@@ -398,7 +415,7 @@ fn title(
     let name_color = if selected { theme.accent } else { theme.text_strong };
     let end = painter.text(rect.left_top(), Align2::LEFT_TOP, name, theme::label_font(), name_color).right();
     let Some((value, sigma)) = value else { return };
-    let color = if verdict == Determination::Determined { theme.text_strong } else { theme.text_weak };
+    let color = if verdict.is_met() { theme.text_strong } else { theme.text_weak };
     let font = theme::number_font();
     let with_sigma = format!("{} ±{}", fixed_value(shown, value, sigma), shown.sigma(sigma));
     let texts = [with_sigma, shown.value(value, sigma)];

@@ -2,6 +2,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
+use crate::sensors::RequiredAccuracy;
 use crate::session::{Answer, Recording, RunRecord};
 
 /// Steps after which an answer is computed again while its run computes.
@@ -24,7 +25,7 @@ impl PartialEq for Answers {
 #[derive(Debug)]
 struct KnownAnswer {
     run: u64,
-    state: (usize, bool, bool),
+    state: (usize, bool, bool, RequiredAccuracy),
     answer: Arc<Answer>,
 }
 
@@ -34,7 +35,8 @@ impl Answers {
         let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
         known.retain(|it| recording.runs.iter().any(|run| run.id == it.run));
         let steps = if run.has_ended() { run.steps.len() } else { run.steps.len() / STEPS_AT_ONCE };
-        let state = (steps, run.has_ended(), recording.check.is_some());
+        let required = recording.rig.required_accuracy.clone();
+        let state = (steps, run.has_ended(), recording.check.is_some(), required);
         if let Some(found) = known.iter().find(|it| it.run == run.id && it.state == state) {
             return Arc::clone(&found.answer);
         }

@@ -11,7 +11,8 @@ use crate::gimbal::ParameterId;
 use crate::gui::parameter_names::place_of;
 use crate::observability::Determination;
 use crate::observability::laboratory::Advice;
-use crate::session::{FlightParameter, FlightVerdicts, Recording, RunRecord, StepRecord};
+use crate::sensors::RequiredAccuracy;
+use crate::session::{Answer, FlightParameter, FlightVerdicts, Recording, RunRecord, StepRecord, Withheld};
 
 /// Calibration tables of all runs; clones share them.
 #[derive(Clone, Debug, Default)]
@@ -38,7 +39,7 @@ pub(crate) struct FlightReport {
     pub(crate) waits_for_advice: bool,
 }
 
-/// σ over prior σ and verdict of each parameter at each step.
+/// Ratio of σ and required accuracy, and verdict of each parameter at each step.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct DeterminationHistory {
     /// Stamps of the steps, in nanoseconds since the log began.
@@ -52,7 +53,7 @@ pub(crate) struct DeterminationHistory {
 #[derive(Clone, Debug)]
 pub(crate) struct ParameterHistory {
     pub(crate) parameter: ParameterId,
-    /// σ over prior σ by step; NaN where the parameter is not estimated.
+    /// σ over required accuracy by step; NaN where the parameter is not estimated.
     pub(crate) ratios: Vec<f32>,
     pub(crate) verdicts: Vec<Determination>,
 }
@@ -60,7 +61,11 @@ pub(crate) struct ParameterHistory {
 #[derive(Debug, Default)]
 struct FlightTable {
     follower: Follower,
+    required: RequiredAccuracy,
+    withheld: Option<Withheld>,
     verdicts: FlightVerdicts,
+    /// Verdicts of all steps, not withheld.
+    history: Arc<DeterminationHistory>,
     advice: StepWork<Arc<Advice>>,
     /// True if `report` contains the motions of the last step's advice.
     advised: bool,
@@ -74,7 +79,13 @@ impl FlightTables {
     }
 
     /// Table of a run after all its steps so far; the suggested motions follow after the end of the run.
-    pub(crate) fn report(&self, ctx: &Context, recording: &Recording, run: &RunRecord) -> FlightReport {
+    pub(crate) fn report(
+        &self,
+        ctx: &Context,
+        recording: &Recording,
+        run: &RunRecord,
+        answer: &Answer,
+    ) -> FlightReport {
         let number = recording.runs.iter().position(|other| other.id == run.id).unwrap_or(0);
         let mut runs = self.runs.lock().unwrap_or_else(PoisonError::into_inner);
         runs.truncate(recording.runs.len());
@@ -82,7 +93,7 @@ impl FlightTables {
             runs.resize_with(number + 1, FlightTable::default);
         }
         let table = &mut runs[number];
-        table.read(recording, run, self.in_background);
+        table.read(recording, run, answer.withheld(), self.in_background);
         if table.report.waits_for_advice {
             ctx.request_repaint_after(REPAINT);
         }
@@ -92,24 +103,41 @@ impl FlightTables {
 
 impl FlightTable {
     /// Reads the new steps of a run, and requests the suggested motions when it has ended.
-    fn read(&mut self, recording: &Recording, run: &RunRecord, in_background: bool) {
-        let new_steps = self.follower.new_steps(run);
-        if new_steps.restarted {
-            let epoch = self.report.history.epoch + 1;
-            (self.verdicts, self.advice) = Default::default();
-            self.report.history = Arc::new(DeterminationHistory { epoch, ..DeterminationHistory::default() });
+    fn read(&mut self, recording: &Recording, run: &RunRecord, withheld: Option<Withheld>, in_background: bool) {
+        let required = &recording.rig.required_accuracy;
+        let is_other_scale = self.required != *required;
+        if is_other_scale {
+            (self.required, self.follower) = (required.clone(), Follower::default());
         }
-        let changed = new_steps.restarted || !new_steps.steps.is_empty();
-        if changed {
-            let history = Arc::make_mut(&mut self.report.history);
+        let new_steps = self.follower.new_steps(run);
+        let restarted = new_steps.restarted || is_other_scale;
+        if restarted {
+            (self.verdicts, self.advice) = (FlightVerdicts::new(required.clone()), StepWork::default());
+            let epoch = self.history.epoch + 1;
+            self.history = Arc::new(DeterminationHistory { epoch, ..DeterminationHistory::default() });
+        }
+        let changed = restarted || !new_steps.steps.is_empty() || withheld != self.withheld;
+        if !new_steps.steps.is_empty() {
+            let history = Arc::make_mut(&mut self.history);
             for step in new_steps.steps {
                 self.verdicts.push(step);
-                history.push(step, &self.verdicts);
+                history.push(step, &self.verdicts, required);
             }
+        }
+        if changed {
+            // Maps of the verdicts are drawn again where their reading of older steps changes.
+            if withheld != self.withheld {
+                Arc::make_mut(&mut self.history).epoch += 1;
+            }
+            self.withheld = withheld;
+            self.report.history = match &self.withheld {
+                Some(withheld) => Arc::new(self.history.withheld(withheld)),
+                None => Arc::clone(&self.history),
+            };
         }
         let ended = run.has_ended();
         let improvable = self.verdicts.verdicts().any(|(_, verdict)| verdict.is_improvable());
-        let step = self.verdicts.ranked_step().filter(|_| ended && improvable);
+        let step = self.verdicts.ranked_step().filter(|_| ended && improvable && self.withheld.is_none());
         if let Some(step) = step {
             self.advice.request(step, "flight advice", in_background, || {
                 let (step, rig, camera) = (Arc::clone(step), Arc::clone(&recording.rig), run.camera_key.clone());
@@ -119,7 +147,11 @@ impl FlightTable {
         let advised = step.is_some_and(|step| self.advice.has_result(step));
         if changed || advised != self.advised {
             let advice = self.advice.last().and_then(|(_, advice)| advice).filter(|_| advised).map(|advice| &**advice);
-            self.report.rows = self.verdicts.table(&recording.rig.parameter_names(), advice).into();
+            let mut rows = self.verdicts.table(&recording.rig.parameter_names(), advice);
+            if let Some(withheld) = &self.withheld {
+                withheld.apply(&mut rows);
+            }
+            self.report.rows = rows.into();
             self.advised = advised;
         }
         self.report.waits_for_advice = step.is_some() && !advised;
@@ -128,7 +160,7 @@ impl FlightTable {
 
 impl DeterminationHistory {
     /// Appends a step that `verdicts` has just read.
-    fn push(&mut self, step: &StepRecord, verdicts: &FlightVerdicts) {
+    fn push(&mut self, step: &StepRecord, verdicts: &FlightVerdicts, required: &RequiredAccuracy) {
         let row = self.stamps_ns.len();
         self.stamps_ns.push(step.report.stamp_ns);
         let calibration = &step.report.calibration;
@@ -140,15 +172,33 @@ impl DeterminationHistory {
                 place
             });
             let index = calibration.index_of(parameter);
-            let entry = |values: &[f64]| index.and_then(|index| values.get(index)).copied().unwrap_or(f64::NAN);
+            let sigma = index.and_then(|index| calibration.sigmas.get(index)).copied().unwrap_or(f64::NAN);
             let history = &mut self.parameters[place];
             history.pad(row);
-            history.ratios.push((entry(&calibration.sigmas) / entry(&calibration.prior_sigmas)) as f32);
+            history.ratios.push((sigma / required.of(parameter)) as f32);
             history.verdicts.push(verdict);
         }
         for history in &mut self.parameters {
             history.pad(row + 1);
         }
+    }
+
+    /// The same history without the verdicts that are withheld.
+    fn withheld(&self, withheld: &Withheld) -> Self {
+        let mut shown = self.clone();
+        for parameter in &mut shown.parameters {
+            for (verdict, stamp_ns) in parameter.verdicts.iter_mut().zip(&self.stamps_ns) {
+                *verdict = withheld.verdict(*stamp_ns, *verdict);
+            }
+        }
+        shown
+    }
+
+    /// Verdict on a parameter at a row; [`Determination::Initializing`] where it is not estimated.
+    pub(crate) fn verdict(&self, parameter: ParameterId, row: Option<usize>) -> Determination {
+        let history = self.parameters.iter().find(|known| known.parameter == parameter);
+        let verdict = history.zip(row).and_then(|(history, row)| history.verdicts.get(row));
+        verdict.copied().unwrap_or(Determination::Initializing)
     }
 
     /// Row at or before a stamp.
@@ -181,15 +231,15 @@ mod tests {
             for count in [10, 30, 69] {
                 growing.steps.truncate(0);
                 growing.steps.extend_from_slice(&run.steps[..count]);
-                tables.report(&context, &recording, &growing);
+                tables.report(&context, &recording, &growing, &Answer::of_run(&recording, &growing));
             }
-            let report = tables.report(&context, &recording, run);
+            let report = tables.report(&context, &recording, run, &Answer::of_run(&recording, run));
             assert!(!report.waits_for_advice && run.finished);
             assert_eq!(report.rows[..], flight_table(&recording, run)[..]);
             assert_eq!(report.rows[..], summarize(&recording, run, false).calibration.estimability[..]);
             assert!(report.rows.iter().any(|row| !row.remedy.is_empty()));
             let history = &report.history;
-            assert_eq!((history.stamps_ns.len(), history.epoch), (70, 0));
+            assert_eq!(history.stamps_ns.len(), 70);
             assert_eq!(history.parameters.len(), report.rows.len());
             for row in report.rows.iter() {
                 let of = history.parameters.iter().find(|it| it.parameter == row.parameter).unwrap();

@@ -45,9 +45,9 @@ pub(super) fn ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, step: &St
         let ratio = fixed(error.abs() / sigma, 1);
         rows.push((terms::ERROR, vec![format!("{} ({ratio} σ)", shown.value(error, sigma))]));
     }
-    let here = step.determinations().into_iter().find(|(known, _)| *known == parameter);
-    rows.push((terms::VERDICT_HERE, vec![here.map_or_else(String::new, |(_, verdict)| verdict.name().to_owned())]));
     let report = ctx.flight(ui, run);
+    let here = report.history.verdict(parameter, report.history.row_at(step.report.stamp_ns));
+    rows.push((terms::VERDICT_HERE, vec![here.name().to_owned()]));
     let flight = report.rows.iter().find(|row| row.parameter == parameter);
     if let Some(flight) = flight {
         let since = flight.since_s().map_or_else(String::new, |since_s| format!(" since {} s", fixed(since_s, 2)));

@@ -4,7 +4,7 @@ use egui::{Color32, Ui};
 
 use super::sections::{MIN_HEIGHT_WITH_CAUSE, fact_at_ui, fact_ui, headline_ui};
 use crate::gui::PanelContext;
-use crate::gui::calibration::span_text;
+use crate::gui::calibration::{rule, span_text};
 use crate::gui::determination::look_of;
 use crate::gui::units::fixed;
 use crate::observability::Determination;
@@ -25,11 +25,12 @@ pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, run: &RunRecord, heigh
     let least = least_determined(&report.rows);
     let low = height < MIN_HEIGHT_WITH_CAUSE && least.is_some();
     if !low {
-        headline_ui(ui, &theme, worst_look(&report.rows, ctx), &span, &headline, Determination::RULE);
+        let headline = if height < MIN_HEIGHT_WITH_CAUSE { short_headline(&report.rows) } else { headline.clone() };
+        headline_ui(ui, &theme, worst_look(&report.rows, ctx), &span, &headline, &rule(ctx, &report.rows));
     }
     let Some(least) = least else { return };
     let name = if low { format!("{span} ") } else { "Least determined: ".to_owned() };
-    let ratio = least.ratio.map_or_else(String::new, |ratio| format!(" (σ / prior {})", fixed(ratio, 2)));
+    let ratio = least.of_required().map_or_else(String::new, |ratio| format!(" (σ {} × required)", fixed(ratio, 2)));
     let line = format!("{} {}{ratio}", look_of(least.verdict, &theme).0, least.name);
     let meaning = format!("{headline}\nLeast determined: {}, {}", least.name, least.verdict_text());
     if fact_at_ui(ui, ctx, &name, &line, least.since_ns, &meaning) {
@@ -43,10 +44,21 @@ pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, run: &RunRecord, heigh
     }
 }
 
+/// Number of parameters that are accurate enough, and of all others by verdict: `12 accurate enough, 12 redundant`.
+fn short_headline(rows: &[FlightParameter]) -> String {
+    let (met, others): (Vec<FlightParameter>, Vec<FlightParameter>) =
+        rows.iter().cloned().partition(|row| row.verdict.is_met());
+    let others = flight_headline(&others);
+    let others = others.split_once(": ").map(|(_, counts)| counts).filter(|counts| !counts.is_empty());
+    let met = (!met.is_empty()).then(|| format!("{} accurate enough", met.len()));
+    met.as_deref().into_iter().chain(others).collect::<Vec<_>>().join(", ")
+}
+
 /// Look of the worst verdict of some rows.
 fn worst_look(rows: &[FlightParameter], ctx: &PanelContext<'_>) -> (&'static str, Color32) {
     let has = |verdict: Determination| rows.iter().any(|row| row.verdict == verdict);
     let order = [
+        Determination::Unknown,
         Determination::NotDetermined,
         Determination::WeaklyDetermined,
         Determination::Redundant,

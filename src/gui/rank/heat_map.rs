@@ -141,7 +141,7 @@ pub(super) fn important_rows(rank: &RankReport, flight: &[FlightParameter]) -> V
     const NAMED: (usize, f64) = (3, 0.2);
     let ratio = |row: &usize| {
         let of = flight.iter().find(|known| rank.parameters.get(*row) == Some(&known.parameter));
-        of.and_then(|known| known.ratio).unwrap_or(0.0)
+        of.and_then(FlightParameter::of_required).unwrap_or(0.0)
     };
     let mut others: Vec<usize> = (0..rank.parameters.len()).collect();
     let mut rows: Vec<usize> = Vec::new();

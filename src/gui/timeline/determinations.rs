@@ -1,4 +1,4 @@
-//! Lane of the calibration parameters: σ over prior σ of each parameter over time, in one fixed order of rows.
+//! Lane of the calibration parameters: verdict on each parameter over time, in one fixed order of rows.
 
 use egui::{Align2, Painter, Rangef, Rect, Role, Ui, WidgetInfo, pos2, vec2};
 
@@ -20,11 +20,12 @@ pub(super) const ROW_HEIGHT: f32 = 13.0;
 const MIN_HEIGHT_WITH_NAME: f32 = 11.0;
 
 /// Levels with the texts of the legend: from the best one to the worst.
-const LEGEND: [(u8, &str); 4] = [
-    (1, "determined, σ < 0.3 prior"),
-    (5, "weakly determined, < 0.9"),
-    (6, "not determined"),
-    (LEVELS - 1, "redundant"),
+const LEGEND: [(u8, &str); 5] = [
+    (1, "determined by the flight"),
+    (4, "given with the prior"),
+    (6, "weakly determined, σ up to 3 × required"),
+    (7, "not determined"),
+    (LEVELS - 2, "redundant"),
 ];
 
 /// Stretches of equal level on the screen, updated only when data, range or width changes.
@@ -129,7 +130,7 @@ pub(super) fn labels_ui(ui: &Ui, ctx: &mut PanelContext<'_>, rect: Rect, history
         }
         let (sense, role) = ctx.presentation.clickable(Role::Label);
         let response = ui.interact(line, ui.unique_id().with(("parameter of the lane", &name)), sense);
-        let text = format!("{name}: {}, σ / prior {}", verdict.name(), fixed(ratio, 2));
+        let text = format!("{name}: {}, σ / required {}", verdict.name(), fixed(ratio, 2));
         response.widget_info(|| WidgetInfo::selected(role, true, selected, format!("{text} at the cursor")));
         if response.contains_pointer() {
             offer_item(ui, Item::Parameter(parameter.parameter));
@@ -164,7 +165,7 @@ pub(super) fn hover_text(
     let step = history.row_at(stamp_ns)?;
     let name = ctx.names().name(parameter.parameter);
     let ratio = fixed(f64::from(parameter.ratios[step]), 3);
-    Some(format!("{name}: {}, σ / prior {ratio}", parameter.verdicts[step].name()))
+    Some(format!("{name}: {}, σ / required {ratio}", parameter.verdicts[step].name()))
 }
 
 #[cfg(test)]
@@ -177,7 +178,8 @@ mod tests {
         let recording = sample_recording_of(80, &["auto"]);
         let tables = crate::gui::Selection::default().flight;
         let (context, run) = (egui::Context::default(), &recording.runs[0]);
-        let whole = tables.report(&context, &recording, run).history;
+        let answer = crate::session::Answer::of_run(&recording, run);
+        let whole = tables.report(&context, &recording, run, &answer).history;
         let rect = Rect::from_min_max(pos2(50.0, 10.0), pos2(850.0, 250.0));
         let area = PlotArea { rect, begin_ns: 0, end_ns: recording.last_stamp_ns(), low: 0.0, high: 1.0 };
         let mut map = LevelMap::default();
@@ -195,7 +197,7 @@ mod tests {
         // While the run is computed, the rows have the same order.
         let mut growing = run.clone();
         growing.steps.truncate(70);
-        let part = crate::gui::Selection::default().flight.report(&context, &recording, &growing).history;
+        let part = crate::gui::Selection::default().flight.report(&context, &recording, &growing, &answer).history;
         let order = |history: &DeterminationHistory| -> Vec<_> {
             history.parameters.iter().map(|parameter| parameter.parameter).collect()
         };

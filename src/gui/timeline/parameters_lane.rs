@@ -91,9 +91,9 @@ impl ParametersLane {
         if ui.input(|input| input.pointer.primary_down()) && self.stretch.is_none() {
             return;
         }
-        let Some(run) = ctx.selected_run() else { return };
+        let Some((run, history)) = ctx.selected_run().zip(history(ui, ctx)) else { return };
         if !self.stretch.as_ref().is_some_and(|known| known.is_of(run, range_ns)) {
-            self.stretch = TimelineStretch::read(run, range_ns, &ctx.recording.rig.joint_names());
+            self.stretch = TimelineStretch::read(run, &history, range_ns, &ctx.recording.rig.joint_names());
         }
         let top = area.rect.top() - transport::HEIGHT;
         let open = self.stretch.as_ref().is_some_and(|it| it.window_ui(ui.ctx(), ctx, top, columns.center()));

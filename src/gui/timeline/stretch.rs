@@ -4,6 +4,7 @@ use egui::{Context, Grid, RichText, ScrollArea, Ui, pos2, vec2};
 
 use crate::gimbal::ParameterId;
 use crate::gui::PanelContext;
+use crate::gui::derived::flight::DeterminationHistory;
 use crate::gui::determination::look_of;
 use crate::gui::units::{fixed, seconds};
 use crate::observability::{Determination, information_rate};
@@ -50,7 +51,12 @@ impl TimelineStretch {
     }
 
     /// Reads a stretch of a run; `None` if it has no step or no estimated parameter.
-    pub(super) fn read(run: &RunRecord, range_ns: (i64, i64), joints: &[String]) -> Option<Self> {
+    pub(super) fn read(
+        run: &RunRecord,
+        history: &DeterminationHistory,
+        range_ns: (i64, i64),
+        joints: &[String],
+    ) -> Option<Self> {
         let first = run.index_at(range_ns.0).unwrap_or(0);
         let last = run.index_at(range_ns.1)?;
         let steps = run.steps.get(first..=last)?;
@@ -61,10 +67,13 @@ impl TimelineStretch {
             let index = calibration.index_of(parameter)?;
             Some((*calibration.sigmas.get(index)?, *calibration.prior_sigmas.get(index)?))
         };
-        let verdicts = steps.last()?.determinations();
-        let mut rows: Vec<StretchRow> = verdicts
-            .into_iter()
-            .filter_map(|(parameter, verdict)| {
+        let row = history.row_at(steps.last()?.report.stamp_ns);
+        let mut rows: Vec<StretchRow> = end
+            .parameters
+            .iter()
+            .filter_map(|parameter| {
+                let parameter = *parameter;
+                let verdict = history.verdict(parameter, row);
                 let (after, prior) = sigma(end, parameter)?;
                 // Before the first solve the prior is all that is known.
                 let before = sigma(begin, parameter).map_or(prior, |(sigma, _)| sigma);
@@ -182,9 +191,12 @@ mod tests {
         let recording = sample_recording_of(first_tracked_frame() + 40, &["auto"]);
         let run = &recording.runs[0];
         let joints = recording.rig.joint_names();
+        let tables = crate::gui::Selection::default().flight;
+        let answer = crate::session::Answer::of_run(&recording, run);
+        let history = tables.report(&Context::default(), &recording, run, &answer).history;
         let (first, last) = (first_tracked_frame() + 5, first_tracked_frame() + 30);
         let range_ns = (run.steps[first].report.stamp_ns, run.steps[last].report.stamp_ns);
-        let stretch = TimelineStretch::read(run, range_ns, &joints).expect("the run estimates parameters");
+        let stretch = TimelineStretch::read(run, &history, range_ns, &joints).expect("the run estimates parameters");
         assert!(stretch.is_of(run, range_ns) && !stretch.is_of(run, (0, range_ns.1)));
         let calibration = |step: usize| &run.steps[step].report.calibration;
         assert_eq!(stretch.rows.len(), calibration(last).parameters.len());
@@ -197,8 +209,8 @@ mod tests {
         assert!(stretch.rows[0].by.is_some(), "{:?}", stretch.rows[0]);
         assert!(stretch.motion.contains("path ") && stretch.motion.contains(&joints[0]), "{}", stretch.motion);
         // Before the first solve the prior gives σ.
-        let early = TimelineStretch::read(run, (0, range_ns.1), &joints).unwrap();
+        let early = TimelineStretch::read(run, &history, (0, range_ns.1), &joints).unwrap();
         assert!(early.rows.iter().all(|row| row.before == row.prior));
-        assert!(TimelineStretch::read(run, (0, 1), &joints).is_none());
+        assert!(TimelineStretch::read(run, &history, (0, 1), &joints).is_none());
     }
 }

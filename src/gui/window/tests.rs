@@ -428,8 +428,12 @@ fn the_verdict_of_the_flight_does_not_depend_on_the_cursor() {
     let mut harness = bench();
     let rows = flight_table(&harness.state().recording, &harness.state().recording.runs[0]);
     let least = least_determined(&rows).expect("some parameter is not determined").clone();
-    let line =
-        format!("{} (σ / prior {:.2}) since {:.2} s", least.name, least.ratio.unwrap(), least.since_s().unwrap());
+    let line = format!(
+        "{} (σ {:.2} × required) since {:.2} s",
+        least.name,
+        least.of_required().unwrap(),
+        least.since_s().unwrap()
+    );
     for cursor_ns in [SECOND_NS, 3 * SECOND_NS, 4 * SECOND_NS] {
         harness.state_mut().cursor_ns = cursor_ns;
         harness.run_steps(3);

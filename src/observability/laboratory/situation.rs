@@ -13,7 +13,7 @@ use crate::estimator::{
 use crate::geometry::Dimension;
 use crate::gimbal::{Chain, ParameterNames};
 use crate::observability::{RankReport, analyse, chain_of_step};
-use crate::sensors::{ImuNoise, Rig};
+use crate::sensors::{ImuNoise, RequiredAccuracy, Rig};
 
 /// State of a run and posterior of its calibration.
 #[derive(Clone, Debug)]
@@ -40,6 +40,8 @@ pub struct Situation {
     pub distances_m: Vec<f64>,
     /// Time between two images, in seconds.
     pub image_period_s: f64,
+    /// Accuracy that the calibration must reach.
+    pub required: RequiredAccuracy,
 }
 
 /// Information about a fixed parameter in units of 10° and 3 cm: σ is a millionth of the unit.
@@ -89,6 +91,7 @@ impl Situation {
             pixel_sigma_px: report.effective_pixel_sigma_px,
             distances_m,
             image_period_s: rig.camera(camera_key).ok()?.rate_hz.recip(),
+            required: rig.required_accuracy.clone(),
             chain,
         })
     }
@@ -120,6 +123,7 @@ impl Situation {
             pixel_sigma_px: window.pixel_sigma_px,
             distances_m: window.landmarks.iter().map(|landmark| landmark.inverse_distance_per_m.recip()).collect(),
             image_period_s: FRAME_PERIOD_S,
+            required: RequiredAccuracy::default(),
             chain,
         })
     }
@@ -133,7 +137,7 @@ impl Situation {
     ///
     /// `joints` has one entry per joint of the configured chain. The joints start in the middle: at zero, moved so that
     /// at least a quarter of the range lies on both sides. `encoder_sigma_rad` is the standard deviation of an encoder
-    /// angle at an image. `None` when the calibration is fixed or a number is not finite.
+    /// angle at an image. The required accuracy is the default. `None` when the calibration is fixed or a number is not finite.
     pub fn before_flight(
         config: &EstimatorConfig,
         joints: Vec<LaboratoryJoint>,
@@ -167,6 +171,7 @@ impl Situation {
             pixel_sigma_px: config.options.pixel_sigma_px,
             distances_m,
             image_period_s,
+            required: RequiredAccuracy::default(),
             chain,
         })
     }

@@ -8,6 +8,7 @@ use super::recompute::{Detail, RecomputeRequest, Recomputed};
 use crate::estimator::CalibrationPosterior;
 use crate::flight_log::LogWarning;
 use crate::log_check::Finding;
+use crate::sensors::RequiredAccuracy;
 use crate::session::plan::SessionPlan;
 use crate::session::record::{
     PassProgress, Recording, RunRecord, SolverPosition, SolverTrace, StepFactorRows, StepRecord,
@@ -71,6 +72,11 @@ impl Computation {
     /// Stores the findings of the check of the log and its rig, on which the answers of the runs depend.
     pub fn set_check(&mut self, findings: Vec<Finding>) {
         self.recording_mut().check = Some(Arc::new(findings));
+    }
+
+    /// Accuracy with which the calibration is compared from now on.
+    pub fn set_required_accuracy(&mut self, required: RequiredAccuracy) {
+        Arc::make_mut(&mut self.recording_mut().rig).required_accuracy = required;
     }
 
     /// Stores a message of the engine in the record.

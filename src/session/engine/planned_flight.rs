@@ -29,8 +29,10 @@ pub fn situation_before_flight(rig: &Rig, spec: &RunSpec, distances_m: Vec<f64>)
     let at_image = |sigma_rad| nominal_joint_sigma_rad(sigma_rad, encoder_rate_hz, camera.rate_hz);
     let encoder_sigma_rad = config.encoder_in_use().map(at_image);
     let (names, period_s) = (rig.parameter_names(), camera.rate_hz.recip());
-    Situation::before_flight(&config, joints.collect(), names, encoder_sigma_rad, distances_m, period_s)
-        .ok_or_else(|| unplannable("the mechanism or its prior is not finite"))
+    let situation =
+        Situation::before_flight(&config, joints.collect(), names, encoder_sigma_rad, distances_m, period_s)
+            .ok_or_else(|| unplannable("the mechanism or its prior is not finite"))?;
+    Ok(Situation { required: rig.required_accuracy.clone(), ..situation })
 }
 
 #[cfg(test)]

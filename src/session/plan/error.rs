@@ -36,6 +36,8 @@ pub enum SessionError {
     /// The posterior of earlier flights belongs to another mechanism.
     #[error("this prior does not fit {user}: {problem}: {}", folder.display())]
     Prior { user: String, problem: String, folder: PathBuf },
+    #[error("cannot use the required accuracy: {problem}")]
+    RequiredAccuracy { problem: String },
     #[error("no motion can be planned for the run '{run}': {problem}")]
     Unplannable { run: String, problem: String },
     #[error("cannot start a thread: {source}")]

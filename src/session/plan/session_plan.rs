@@ -37,6 +37,8 @@ pub struct SessionRequest {
     pub truth_trajectory: Option<TrajectorySource>,
     /// Lever arm of the antenna whose positions are the ground truth, instead of the rig's `ground_truth.lever_arm`.
     pub lever_arm: Option<LeverArm>,
+    /// Required accuracy instead of the rig's, as in [`RequiredAccuracy::with`].
+    pub required_accuracy: Option<String>,
     /// Calibration of earlier flights that the runs start from.
     pub prior: Option<Arc<FlightPrior>>,
     /// Seconds to skip at the start of the log.
@@ -97,7 +99,11 @@ impl SessionPlan {
     pub fn open(request: &SessionRequest) -> Result<Self, SessionError> {
         let log = Arc::new(FlightLog::open_with(&request.log_path, &request.limits)?);
         check_start(&log, request.start_s)?;
-        let rig = Rig::for_log(&log, request.rig_path.as_deref())?;
+        let mut rig = Rig::for_log(&log, request.rig_path.as_deref())?;
+        if let Some(text) = &request.required_accuracy {
+            let required = rig.required_accuracy.with(text, &rig.parameter_names());
+            rig.required_accuracy = required.map_err(|problem| SessionError::RequiredAccuracy { problem })?;
+        }
         let ground_truth_rig = rig.own_ground_truth(&log, request.ground_truth_path.as_deref())?;
         let mut specs = request.specs.clone();
         if specs.is_empty() {

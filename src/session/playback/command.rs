@@ -1,4 +1,5 @@
 use super::markers::Markers;
+use crate::sensors::RequiredAccuracy;
 use crate::session::breakpoints::Condition;
 use crate::session::plan::{ForkChanges, RunSpec};
 
@@ -93,6 +94,8 @@ pub enum Command {
         run: usize,
         step: usize,
     },
+    /// Compare the calibration with this accuracy.
+    RequireAccuracy(RequiredAccuracy),
     /// Set the memory budget of the recording in bytes.
     SetMemoryBudget(usize),
 }

@@ -9,6 +9,7 @@ use super::saved::{
     entry_error,
 };
 use super::session::Session;
+use crate::sensors::RequiredAccuracy;
 use crate::session::breakpoints::Condition;
 use crate::session::plan::{FlightPrior, ForkChanges, SessionPlan, SessionRequest, TrajectorySource, TrajectorySpec};
 
@@ -47,7 +48,7 @@ impl Session {
     /// The session for a file; `layout` is the layout of the panels.
     pub fn saved(&self, layout: Option<serde_json::Value>) -> SavedSession {
         let recording = self.recording();
-        let log = &self.plan.log;
+        let (log, required) = (&self.plan.log, &recording.rig.required_accuracy);
         let absolute = |path: &PathBuf| std::path::absolute(path).unwrap_or_else(|_| path.clone());
         let name_of = |id: u64| recording.runs.iter().find(|run| run.id == id).map(|run| run.spec.label.clone());
         let forks = recording.runs.iter().filter_map(|run| {
@@ -72,6 +73,8 @@ impl Session {
             ground_truth: self.plan.ground_truth_path.as_ref().map(absolute),
             truth_trajectory: self.plan.truth_request.0.as_ref().map(|source| absolute_source(source).to_string()),
             lever_arm: self.plan.truth_request.1.map(|lever_arm| lever_arm.to_string()),
+            required_accuracy: (*required != RequiredAccuracy::default())
+                .then(|| required.to_text(&recording.rig.parameter_names())),
             start_s: self.plan.start_s,
             duration_s: self.plan.duration_s,
             runs: recording.runs.iter().filter(|run| run.origin.is_none()).map(|run| run.spec.to_string()).collect(),

@@ -53,6 +53,9 @@ pub struct SavedSession {
     /// Lever arm of the antenna whose positions are the ground truth, as on the command line.
     #[serde(default)]
     pub lever_arm: Option<String>,
+    /// Required accuracy, as on the command line; `None` for 5 mm and 0.1°.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub required_accuracy: Option<String>,
     /// Seconds to skip at the start of the log.
     pub start_s: f64,
     /// Seconds to read from there, `None` for the rest of the log.
@@ -140,6 +143,7 @@ impl SavedSession {
         Ok(SessionRequest {
             truth_trajectory: truth.transpose().map_err(entry_error)?,
             lever_arm: lever_arm.transpose().map_err(entry_error)?,
+            required_accuracy: self.required_accuracy.clone(),
             log_path: self.log.path.clone(),
             recording: self.recording.clone(),
             rig_path: self.rig.clone(),
@@ -184,6 +188,7 @@ mod tests {
             ground_truth: Some(path(b"/logs/plain.yaml")),
             truth_trajectory: None,
             lever_arm: None,
+            required_accuracy: None,
             start_s: 0.0,
             duration_s: None,
             runs: Vec::new(),

@@ -240,6 +240,9 @@ impl Session {
             Command::Diagnose { run } => self.diagnose(run),
             Command::StopDiagnosis => self.diagnosis.iter().for_each(BackgroundDiagnosis::stop),
             Command::RequestFactorRows { run, step } => self.request_factor_rows(run, step),
+            Command::RequireAccuracy(required) => {
+                self.shared.change(|computation| computation.set_required_accuracy(required));
+            }
             Command::SetMemoryBudget(bytes) => {
                 self.plan.memory_budget_bytes = bytes;
                 self.shared.change(|computation| computation.set_memory_budget(bytes));

@@ -40,12 +40,14 @@ impl<'a> CalibrationRow<'a> {
                 .text(|row, medium| row.flight.ratio.map_or_else(String::new, |ratio| medium.fixed(ratio, 3)))
                 .headings("σ / prior", "σ / prior σ")
                 .largest_first(),
+            CalibrationColumn::new("flight_sigma", |row| row.flight.flight_sigma),
+            CalibrationColumn::new("required", |row| row.flight.required),
             CalibrationColumn::new("verdict", |row| row.flight.verdict.name())
                 .means("", Determination::RULE)
                 .text(|row, medium| row.flight.verdict.shown(medium))
                 .tone(|row| row.flight.verdict.tone())
                 .order(|a, b| {
-                    let rank = |row: &Self| (row.flight.verdict.severity(), row.flight.ratio);
+                    let rank = |row: &Self| (row.flight.verdict.severity(), row.flight.of_required());
                     rank(a).partial_cmp(&rank(b)).unwrap_or(std::cmp::Ordering::Equal)
                 })
                 .headings("Verdict", "verdict")
@@ -144,6 +146,8 @@ mod tests {
                 sigma,
                 prior_sigma: Some(0.25),
                 ratio: Some(0.5),
+                flight_sigma: None,
+                required: 0.0625,
                 verdict: Determination::WeaklyDetermined,
                 since_ns: Some(1_500_000_000),
                 cause: None,

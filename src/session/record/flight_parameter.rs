@@ -25,6 +25,10 @@ pub struct FlightParameter {
     pub prior_sigma: Option<f64>,
     /// Posterior divided by prior standard deviation.
     pub ratio: Option<f64>,
+    /// Standard deviation by the measurements of the flight alone; `None` where the prior alone determines the value.
+    pub flight_sigma: Option<f64>,
+    /// Required accuracy in the unit of the value.
+    pub required: f64,
     pub verdict: Determination,
     /// Stamp from which the verdict holds without interruption, in nanoseconds since the log began (in files seconds).
     #[serde(rename = "since_s", serialize_with = "optional_seconds")]
@@ -73,11 +77,19 @@ impl FlightParameter {
         self.since_ns.map(seconds_from_ns)
     }
 
-    /// Verdict, ratio and start: `not determined (σ 0.98 of the prior) since 3.55 s`.
+    /// Posterior standard deviation divided by the required accuracy.
+    pub fn of_required(&self) -> Option<f64> {
+        self.sigma.map(|sigma| sigma / self.required)
+    }
+
+    /// Verdict, σ and start: `not determined (σ 7.4 mm, required 5 mm) since 3.55 s`.
     pub fn verdict_text(&self) -> String {
-        let ratio = self.ratio.map_or_else(String::new, |ratio| format!(" (σ {ratio:.2} of the prior)"));
+        let shown = self.parameter.shown();
+        let sigma = self.sigma.map_or_else(String::new, |sigma| {
+            format!(" (σ {}, required {})", shown.sigma(sigma), shown.sigma(self.required))
+        });
         let since = self.since_s().map_or_else(String::new, |since_s| format!(" since {since_s:.2} s"));
-        format!("{}{ratio}{since}", self.verdict.name())
+        format!("{}{sigma}{since}", self.verdict.name())
     }
 
     /// The row as one text, for a screen reader and the clipboard.

@@ -12,7 +12,7 @@ use crate::observability::laboratory::{Advice, Situation, advise};
 use crate::observability::{
     Correlations, Determination, LossCause, ParameterState, RankReport, Redundancy, exciting_motion, parameter_states,
 };
-use crate::sensors::Rig;
+use crate::sensors::{RequiredAccuracy, Rig};
 use crate::text::Named as _;
 
 /// Ratio of predicted and present σ from which a motion does not help.
@@ -21,6 +21,7 @@ const MIN_EFFECT_RATIO: f64 = 0.98;
 /// Verdicts of a run so far: each step is read once, in time order, and the cursor has no effect.
 #[derive(Clone, Debug, Default)]
 pub struct FlightVerdicts {
+    required: RequiredAccuracy,
     parameters: BTreeMap<ParameterId, Followed>,
     redundancy: Redundancy,
     last: Option<Arc<StepRecord>>,
@@ -72,9 +73,14 @@ impl Windows {
 }
 
 impl FlightVerdicts {
+    /// Verdicts before the first step.
+    pub fn new(required: RequiredAccuracy) -> Self {
+        Self { required, ..Self::default() }
+    }
+
     /// Verdicts after all steps of a run.
-    pub fn of_run(run: &RunRecord) -> Self {
-        let mut verdicts = Self::default();
+    pub fn of_run(run: &RunRecord, required: &RequiredAccuracy) -> Self {
+        let mut verdicts = Self::new(required.clone());
         run.steps.iter().for_each(|step| verdicts.push(step));
         verdicts
     }
@@ -87,7 +93,8 @@ impl FlightVerdicts {
             self.ranked = Some(Arc::clone(step));
         }
         let mut parameters = BTreeMap::new();
-        for (parameter, verdict) in step.determinations_with(&self.redundancy) {
+        let ranked = self.ranked.as_ref().and_then(|ranked| ranked.rank.as_ref());
+        for (parameter, verdict) in step.determinations_with(&self.required, ranked, &self.redundancy) {
             let since = Followed { verdict, since_ns: step.report.stamp_ns, windows: Windows::default() };
             let mut followed = self.parameters.get(&parameter).copied().unwrap_or(since);
             if followed.verdict != verdict {
@@ -129,6 +136,8 @@ impl FlightVerdicts {
                 Determination::Redundant => Some(LossCause::Parameterization),
                 verdict => verdict.is_improvable().then(|| followed.windows.cause()),
             };
+            let required = self.required.of(*parameter);
+            let ranked = self.ranked.as_ref().and_then(|step| step.rank.as_ref());
             let correlated = correlations.as_ref().map_or_else(String::new, |all| all.text(*parameter, names));
             rows.push(FlightParameter {
                 parameter: *parameter,
@@ -139,6 +148,8 @@ impl FlightVerdicts {
                 sigma,
                 prior_sigma,
                 ratio: sigma.zip(prior_sigma).map(|(sigma, prior_sigma)| sigma / prior_sigma),
+                flight_sigma: ranked.map(|rank| rank.flight_sigma(*parameter)).filter(|sigma| sigma.is_finite()),
+                required,
                 verdict: followed.verdict,
                 since_ns: (followed.verdict != Determination::Initializing).then_some(followed.since_ns),
                 cause,
@@ -157,24 +168,31 @@ impl FlightVerdicts {
 }
 
 impl StepRecord {
-    /// Verdicts on the parameters of this step by its σ and prior σ, in column order.
-    pub fn determinations(&self) -> Vec<(ParameterId, Determination)> {
-        let redundancy =
-            self.rank.as_ref().map_or_else(Redundancy::default, |rank| Redundancy::of_step(&self.report, rank));
-        self.determinations_with(&redundancy)
+    /// Verdicts on the parameters of this step against a required accuracy, in column order.
+    pub fn determinations(&self, required: &RequiredAccuracy) -> Vec<(ParameterId, Determination)> {
+        let rank = self.rank.as_ref();
+        let redundancy = rank.map_or_else(Redundancy::default, |rank| Redundancy::of_step(&self.report, rank));
+        self.determinations_with(required, rank, &redundancy)
     }
 
-    fn determinations_with(&self, redundancy: &Redundancy) -> Vec<(ParameterId, Determination)> {
+    /// The same with σ by the measurements alone and the redundant parameters of an earlier step, if this one has no rank
+    /// report.
+    fn determinations_with(
+        &self,
+        required: &RequiredAccuracy,
+        rank: Option<&RankReport>,
+        redundancy: &Redundancy,
+    ) -> Vec<(ParameterId, Determination)> {
         let calibration = &self.report.calibration;
         let fixed =
             |parameter: &ParameterId| self.rank.as_ref().is_some_and(|rank| rank.fixed_parameters.contains(parameter));
         let verdict = |(index, parameter): (usize, &ParameterId)| {
-            let entry = |values: &[f64]| values.get(index).copied().unwrap_or(f64::NAN);
-            let (sigma, prior_sigma) = (entry(&calibration.sigmas), entry(&calibration.prior_sigmas));
+            let sigma = calibration.sigmas.get(index).copied().unwrap_or(f64::NAN);
+            let flight_sigma = rank.map_or(f64::INFINITY, |rank| rank.flight_sigma(*parameter));
             let verdict = if fixed(parameter) {
                 Determination::Fixed
             } else {
-                Determination::of(sigma, prior_sigma, redundancy.contains(*parameter))
+                Determination::of(sigma, flight_sigma, required.of(*parameter), redundancy.contains(*parameter))
             };
             (*parameter, verdict)
         };
@@ -230,9 +248,9 @@ pub fn flight_advice(step: &StepRecord, rig: &Rig, camera_key: &str) -> Option<A
     advise(&situation)
 }
 
-/// Calibration table of a run after its last step: the same for window, report and files.
-pub fn flight_table(recording: &Recording, run: &RunRecord) -> Vec<FlightParameter> {
-    let verdicts = FlightVerdicts::of_run(run);
+/// Calibration table of a run after its last step, verdicts not withheld.
+pub(in crate::session) fn flight_rows(recording: &Recording, run: &RunRecord) -> Vec<FlightParameter> {
+    let verdicts = FlightVerdicts::of_run(run, &recording.rig.required_accuracy);
     let improvable = verdicts.verdicts().any(|(_, verdict)| verdict.is_improvable());
     let ranked = verdicts.ranked_step().filter(|_| improvable);
     let advice = ranked.and_then(|step| flight_advice(step, &recording.rig, &run.camera_key));
@@ -249,8 +267,8 @@ pub fn flight_headline(rows: &[FlightParameter]) -> String {
     format!("{} {noun}: {}", rows.len(), counted.collect::<Vec<_>>().join(", "))
 }
 
-/// Parameter with the largest ratio of posterior and prior σ among those that another flight could improve.
+/// Parameter with the largest ratio of σ and required accuracy among those that another flight could improve.
 pub fn least_determined(rows: &[FlightParameter]) -> Option<&FlightParameter> {
     let improvable = rows.iter().filter(|row| row.verdict.is_improvable());
-    improvable.max_by(|a, b| a.ratio.unwrap_or(0.0).total_cmp(&b.ratio.unwrap_or(0.0)))
+    improvable.max_by(|a, b| a.of_required().unwrap_or(0.0).total_cmp(&b.of_required().unwrap_or(0.0)))
 }

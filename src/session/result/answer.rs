@@ -7,7 +7,8 @@ use serde::Serialize;
 
 use super::truth;
 use crate::faults::{Area, Fault, FaultKind, Sensor};
-use crate::geometry::{Dimension, ns_from_seconds, seconds_from_ns};
+use crate::geometry::{ns_from_seconds, seconds_from_ns};
+use crate::gimbal::ParameterId;
 use crate::log_check::{Finding, Trust, joint_statement, problems};
 use crate::observability::Determination;
 use crate::sensors::Rig;
@@ -15,7 +16,6 @@ use crate::session::misfit::agreement::{self, AgreementValue};
 use crate::session::misfit::{Misfit, StepMisfit};
 use crate::session::plan::ForkChanges;
 use crate::session::record::{Recording, RunRecord, StepRecord, optional_seconds};
-use crate::table::Shown;
 
 /// Fewest steps with a window from which the residuals of a run are judged: the first windows settle.
 const JUDGED_STEPS: usize = 40;
@@ -113,6 +113,11 @@ impl Answer {
         Self::of(&recording.rig, check, run)
     }
 
+    /// True for a trusted run whose parameters all reach the required accuracy.
+    pub fn meets_requirement(&self) -> bool {
+        self.trust == Trust::Trusted && self.requirement.as_ref().is_none_or(|it| it.met == it.parameters)
+    }
+
     /// The same from the findings of the check of the log.
     pub(in crate::session) fn of(rig: &Rig, check: &[Finding], run: &RunRecord) -> Self {
         let mut findings: Vec<RunFinding> = check_findings(rig, check, run).collect();
@@ -121,7 +126,7 @@ impl Answer {
         findings.extend(disagreement(run));
         // A stable sort: the sources have the order of what they say about a cause.
         findings.sort_by_key(|finding| std::cmp::Reverse(finding.trust));
-        let trust = findings.first().map_or(Trust::Trusted, |finding| finding.trust);
+        let trust = findings.iter().map(|finding| finding.trust).max().unwrap_or_default();
         let requirement = requirement(rig, run);
         let sentence = match (findings.first(), &requirement) {
             (Some(first), _) => trust.sentence(first.since_ns.map(seconds_from_ns), &statement(&findings)),
@@ -157,7 +162,7 @@ fn check_findings<'a>(rig: &'a Rig, check: &'a [Finding], run: &'a RunRecord) ->
     relevant.filter_map(|finding| {
         let trust = Trust::after(finding);
         (trust > Trust::Trusted).then(|| RunFinding {
-            trust: if finding.title.contains("ground truth") { Trust::Doubtful } else { trust },
+            trust: if is_about_ground_truth(finding) { Trust::Doubtful } else { trust },
             source: FindingSource::Check,
             statement: finding.title.clone(),
             evidence: finding.evidence.clone(),
@@ -166,6 +171,10 @@ fn check_findings<'a>(rig: &'a Rig, check: &'a [Finding], run: &'a RunRecord) ->
             checked: Some(finding.clone()),
         })
     })
+}
+
+fn is_about_ground_truth(finding: &Finding) -> bool {
+    finding.title.contains("ground truth")
 }
 
 /// True unless a finding is about a camera or about joint angles that the run does not use. The title of a finding names
@@ -321,36 +330,18 @@ fn in_words(value: &AgreementValue) -> String {
 fn requirement(rig: &Rig, run: &RunRecord) -> Option<Requirement> {
     let required = &rig.required_accuracy;
     let last = run.steps.last().filter(|_| run.spec.calibrate)?;
-    let redundant = |verdict: Determination| matches!(verdict, Determination::Redundant | Determination::Fixed);
-    let left_out: Vec<bool> = last.determinations().into_iter().map(|(_, verdict)| redundant(verdict)).collect();
+    let determinations = last.determinations(required);
+    let counts = |verdict: &Determination| {
+        !matches!(verdict, Determination::Redundant | Determination::Fixed | Determination::Initializing)
+    };
+    let left_out: Vec<bool> = determinations.iter().map(|(_, verdict)| !counts(verdict)).collect();
     let calibration = &last.report.calibration;
     let names = rig.parameter_names();
-    let mut dimensions = Vec::new();
-    let (mut met, mut parameters, mut worst) = (0, 0, None);
-    for (column, parameter) in calibration.parameters.iter().enumerate() {
-        let sigma = calibration.sigmas.get(column).copied().unwrap_or(f64::NAN);
-        if left_out.get(column).copied().unwrap_or(true) || !sigma.is_finite() {
-            continue;
-        }
-        let dimension = parameter.dimension();
-        let ratio = sigma / required.of(dimension);
-        parameters += 1;
-        met += usize::from(ratio <= 1.0);
-        if !dimensions.contains(&dimension) {
-            dimensions.push(dimension);
-        }
-        if ratio > 1.0 && worst.as_ref().is_none_or(|(largest, _)| ratio > *largest) {
-            worst = Some((ratio, format!("{} ± {}", names.name(*parameter), Shown::of(dimension).sigma(sigma))));
-        }
-    }
-    dimensions.sort_by_key(|dimension| (*dimension != Dimension::Length, *dimension));
-    let texts: Vec<String> = dimensions
-        .iter()
-        .map(|dimension| {
-            let shown = Shown::of(*dimension);
-            format!("{}{}", round(required.of(*dimension) * shown.factor), shown.unit)
-        })
-        .collect();
+    let counted: Vec<(usize, ParameterId)> =
+        (0..).zip(&calibration.parameters).filter(|(column, _)| !left_out[*column]).map(|(i, it)| (i, *it)).collect();
+    let ratio = |(column, parameter): &(usize, ParameterId)| calibration.sigmas[*column] / required.of(*parameter);
+    let worst = counted.iter().max_by(|a, b| ratio(a).total_cmp(&ratio(b))).filter(|worst| ratio(worst) > 1.0);
+    let met = determinations.iter().filter(|(_, verdict)| verdict.is_met()).count();
     let all_meet = |step: &StepRecord| {
         let calibration = &step.report.calibration;
         calibration.parameters.len() == left_out.len()
@@ -359,15 +350,17 @@ fn requirement(rig: &Rig, run: &RunRecord) -> Option<Requirement> {
                 .iter()
                 .zip(&calibration.sigmas)
                 .zip(&left_out)
-                .all(|((parameter, sigma), left_out)| *left_out || *sigma <= required.of(parameter.dimension()))
+                .all(|((parameter, sigma), left_out)| *left_out || *sigma <= required.of(*parameter))
     };
     let since = run.steps.iter().rev().take_while(|step| all_meet(step)).last();
-    (parameters > 0).then(|| Requirement {
+    (!counted.is_empty()).then(|| Requirement {
         met,
-        parameters,
-        required: and(&texts),
-        worst: worst.map(|(_, text)| text),
-        since_s: since.filter(|_| met == parameters).map(|step| seconds_from_ns(step.report.stamp_ns)),
+        parameters: counted.len(),
+        required: required.text_for(counted.iter().map(|(_, parameter)| *parameter)),
+        worst: worst.map(|(column, parameter)| {
+            format!("{} ± {}", names.name(*parameter), parameter.shown().sigma(calibration.sigmas[*column]))
+        }),
+        since_s: since.filter(|_| met == counted.len()).map(|step| seconds_from_ns(step.report.stamp_ns)),
     })
 }
 
@@ -379,19 +372,5 @@ impl Requirement {
         let worst = worst.as_ref().map_or_else(String::new, |worst| format!(", worst {worst}"));
         let since = since_s.map_or_else(String::new, |since_s| format!(", since {since_s:.1} s"));
         format!("{mark} {met} of {parameters} parameters within {required}{worst}{since}")
-    }
-}
-
-/// A number with at most three decimals, without zeros at its end.
-fn round(value: f64) -> f64 {
-    (value * 1e3).round() / 1e3
-}
-
-/// Words with commas and an `and` before the last.
-fn and(words: &[String]) -> String {
-    match words {
-        [] => String::new(),
-        [one] => one.clone(),
-        [most @ .., last] => format!("{} and {last}", most.join(", ")),
     }
 }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use serde::{Serialize, Serializer};
 
 use super::answer::Answer;
+use super::withheld::flight_table;
 use crate::calibration::ChainDistance;
 use crate::estimator::{Phase, Stage, StageTimes};
 use crate::geometry::seconds_from_ns;
@@ -14,7 +15,7 @@ use crate::sensors::Rig;
 use crate::session::accuracy::path_length_m;
 use crate::session::record::{
     FlightParameter, KnownLossSummary, ParameterSummary, Recording, RunRecord, TrajectoryAccuracy, TrajectoryLane,
-    flight_table, known_losses, log_warning_lines, run_warning_lines,
+    known_losses, log_warning_lines, run_warning_lines,
 };
 use crate::text::{Named as _, log_name};
 

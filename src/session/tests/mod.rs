@@ -8,4 +8,5 @@ pub(crate) mod memory;
 mod passes;
 mod plan;
 mod rig_values;
+mod verdicts;
 mod warnings;

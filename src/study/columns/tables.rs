@@ -161,8 +161,10 @@ impl<'a> ParameterRow<'a> {
             ParameterColumn::new("truth", |row| row.parameter.ground_truth).means("", "ground-truth value"),
             ParameterColumn::new("error", |row| row.parameter.error).means("", "final minus truth"),
             ParameterColumn::new("ratio", |row| row.verdict?.ratio).means("", "sigma over prior sigma at the end"),
-            ParameterColumn::new("verdict", |row| Some(row.verdict?.verdict.name().to_owned()))
-                .means("", "determined, weakly determined, not determined or redundant, from the whole flight"),
+            ParameterColumn::new("verdict", |row| Some(row.verdict?.verdict.name().to_owned())).means(
+                "",
+                "determined, given, weakly determined, not determined, redundant or unknown, from the whole flight",
+            ),
         ];
         columns.into()
     }

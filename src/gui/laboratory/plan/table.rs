@@ -9,8 +9,8 @@ use crate::gui::help::terms::window;
 use crate::gui::table::{TableRow, TableUi};
 use crate::gui::theme::Theme;
 use crate::gui::units::fixed;
+use crate::observability::Determination;
 use crate::observability::laboratory::{MotionPrediction, PlannedRow, Situation};
-use crate::observability::{DETERMINED_RATIO, Determination, NOT_DETERMINED_RATIO};
 use crate::text::Named as _;
 
 const HEADING_HEIGHT: f32 = 17.0;
@@ -46,7 +46,8 @@ pub(super) fn headline_ui(ui: &mut Ui, theme: &Theme, shown: &ShownPrediction<'_
         }
         if !is_open {
             let (mark, color) = look_of(Determination::Determined, theme);
-            ui.label(RichText::new(format!("{mark} every parameter determined")).strong().color(color));
+            let required = shown.situation.required.text_for(shown.situation.chain.parameters());
+            ui.label(RichText::new(format!("{mark} every parameter within {required}")).strong().color(color));
         }
     });
     let text = format!(
@@ -75,8 +76,8 @@ pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, shown: &ShownPredictio
     table.rows_ui(ui, ctx, properties, |painter, rect, row| paint_bar(painter, &theme, rect, row));
 }
 
-/// Draws σ / prior from 0 to 1 with the limits of the verdicts, the value before the last change as an outline, and that
-/// of the log alone as a thin mark.
+/// Draws σ / prior from 0 to 1 with a line at the required accuracy, the value before the last change as an outline, and
+/// the value of the log alone as a thin mark.
 fn paint_bar(painter: &egui::Painter, theme: &Theme, rect: Rect, row: &PlannedRow<'_>) {
     let x = |ratio: f64| rect.left() + ratio.clamp(0.0, 1.0) as f32 * rect.width();
     let to = |ratio: f64| Rect::from_x_y_ranges(rect.left()..=x(ratio), rect.y_range());
@@ -86,8 +87,9 @@ fn paint_bar(painter: &egui::Painter, theme: &Theme, rect: Rect, row: &PlannedRo
     if let Some(before) = row.ratio_before {
         painter.rect_stroke(to(before), 0.0, Stroke::new(1.0, theme.text), StrokeKind::Inside);
     }
-    for limit in [DETERMINED_RATIO, NOT_DETERMINED_RATIO] {
-        painter.vline(x(limit), rect.y_range(), Stroke::new(1.0, theme.outline));
+    let required = row.last.required * row.last.ratio / row.last.sigma;
+    if required < 1.0 {
+        painter.vline(x(required), rect.y_range(), Stroke::new(1.0, theme.outline));
     }
     if let Some(flight) = row.flight {
         painter.vline(x(flight.ratio), rect.expand2(vec2(0.0, 2.0)).y_range(), Stroke::new(1.5, theme.text_strong));

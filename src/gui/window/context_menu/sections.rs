@@ -15,7 +15,6 @@ use crate::gui::window::copying::copy_value;
 use crate::gui::window::dialogs::state::Dialogs;
 use crate::gui::window::notices::Notices;
 use crate::gui::{Dialog, PanelContext, PanelName, ReadingCursor};
-use crate::observability::DETERMINED_RATIO;
 use crate::session::breakpoints::Condition;
 use crate::session::{Command, FlightParameter, Marker};
 use crate::text::Named as _;
@@ -226,9 +225,9 @@ impl Sections<'_, '_> {
     }
 }
 
-/// Condition that a parameter is determined: σ below the limit, in degrees, millimetres or the stored unit.
+/// Condition that a parameter is as accurate as required: σ below the limit, in degrees, millimetres or the stored unit.
 fn determined(row: &FlightParameter, name: &str) -> Option<Condition> {
-    let limit = DETERMINED_RATIO * row.sigma? / row.ratio?;
+    let limit = row.required;
     let limit = match row.parameter.dimension() {
         Dimension::Angle => format!("{} deg", fixed(limit.to_degrees(), 4)),
         Dimension::Length => format!("{} mm", fixed(1e3 * limit, 3)),

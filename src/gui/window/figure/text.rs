@@ -3,7 +3,7 @@
 use crate::geometry::seconds_from_ns;
 use crate::gui::PanelName;
 use crate::gui::comparison::ComparisonView;
-use crate::observability::{DETERMINED_RATIO, NOT_DETERMINED_RATIO};
+use crate::observability::WEAKLY_DETERMINED_RATIO;
 use crate::session::Recording;
 
 /// Colours and dashes of the runs in the light and the print theme, in words.
@@ -115,8 +115,9 @@ fn convergence(recording: &Recording, label: &str, runs: &str, at_s: f64) -> Str
     format!(
         "One plot per parameter, in the order of the chain; horizontally time, vertically the value in degrees or \
          millimetres. Lines: {runs}{truth}. Band: ±3σ of run {label}. Hatched, with a red strip below: the flight up to \
-         then does not determine the parameter (σ from {NOT_DETERMINED_RATIO} of the prior σ on); amber strip: it \
-         determines it weakly (from {DETERMINED_RATIO} on). Above each plot: value and σ at {at_s:.2} s.{error}"
+         then does not determine the parameter (σ over {WEAKLY_DETERMINED_RATIO} times the required accuracy); amber \
+         strip: it determines it weakly (over the required accuracy); blue strip: the required accuracy is reached only \
+         together with the prior. Above each plot: value and σ at {at_s:.2} s.{error}"
     )
 }
 

@@ -8,6 +8,7 @@ use crate::gui::rank::verdict::{RankVerdict, verdict};
 use crate::gui::theme::MAX_RUNS;
 use crate::gui::units::{counted, fixed};
 use crate::observability::{RankReport, parameters_of};
+use crate::sensors::RequiredAccuracy;
 use crate::session::{LostSince, RunRecord, StepRecord};
 use crate::text::Named as _;
 
@@ -41,7 +42,7 @@ pub(super) fn of(stop: Stop, story: Story, ctx: &PanelContext<'_>, excitation: O
     let names = ctx.names();
     let (lines, waiting) = match stop {
         Stop::Log | Stop::Image => (image_lines(step), None),
-        Stop::Convergence => (convergence_lines(step, &names), None),
+        Stop::Convergence => (convergence_lines(step, &names, &ctx.recording.rig.required_accuracy), None),
         Stop::Which => (which_lines(run, step, &names), None),
         Stop::Why => why_lines(ctx, run, step),
         Stop::Remedy => remedy_lines(run, step, &names, excitation),
@@ -120,9 +121,9 @@ pub(super) fn least_reduced(run: &RunRecord, instant_ns: i64) -> Option<Paramete
     step.report.calibration.parameters.get(index).copied()
 }
 
-fn convergence_lines(step: &StepRecord, names: &ParameterNames) -> Vec<String> {
+fn convergence_lines(step: &StepRecord, names: &ParameterNames, required: &RequiredAccuracy) -> Vec<String> {
     let calibration = &step.report.calibration;
-    let (reductions, verdicts) = (reductions(step), step.determinations());
+    let (reductions, verdicts) = (reductions(step), step.determinations(required));
     let line = |(index, ratio): (usize, f64)| {
         let parameter = calibration.parameters[index];
         let shown = parameter.shown();

@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::super::Situation;
 use crate::gimbal::ParameterId;
 use crate::observability::classification::excitable_directions;
+use crate::observability::flight_sigmas::sigmas_without_prior;
 
 /// Quantity that a plan minimizes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,7 +34,9 @@ pub(super) struct Objective {
     excitable: DMatrix<f64>,
     /// True for each column that the parameterization has twice.
     redundant: Vec<bool>,
-    /// Information along the observable directions before the motion (k × k): of the prior, or of an earlier flight too.
+    /// Information of the prior along the observable directions (k × k).
+    prior: DMatrix<f64>,
+    /// The same before the motion: of the prior, or of an earlier flight too.
     start: DMatrix<f64>,
     /// Prior σ of every column within these directions, in column units.
     prior_sigmas: Vec<f64>,
@@ -53,6 +56,7 @@ impl Objective {
             criterion,
             excitable,
             redundant: redundant_columns(situation),
+            prior: start.clone(),
             start,
             prior_sigmas: Vec::new(),
             columns: Vec::new(),
@@ -100,6 +104,14 @@ impl Objective {
     /// Prior σ and σ after this much information of every column, in column units.
     pub(super) fn sigmas(&self, gained: &DMatrix<f64>) -> Option<(&[f64], Vec<f64>)> {
         Some((&self.prior_sigmas, sigmas_of(&self.covariance(gained)?)))
+    }
+
+    /// σ of every column after this much information, without the part of the prior, in column units.
+    pub(super) fn sigmas_without_prior(&self, gained: &DMatrix<f64>) -> Option<Vec<f64>> {
+        let information = &self.start + self.excitable.tr_mul(&(gained * &self.excitable));
+        let [factor, prior] = [information, self.prior.clone()]
+            .map(|information| information.cholesky().map(|cholesky| cholesky.l().transpose()));
+        Some(sigmas_without_prior(&factor?, &prior?, &self.excitable))
     }
 
     /// Ratios of σ to the prior's σ of the columns of the criterion, with their columns.

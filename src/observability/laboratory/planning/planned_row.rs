@@ -44,7 +44,7 @@ impl<'a> PlannedRow<'a> {
 
     /// Columns in files and on the screen; `flight` is the meaning of the σ of the log.
     pub fn columns(flight: String) -> Vec<PlannedColumn<'a>> {
-        let of_ratio = "Last σ over the prior σ; lines: 0.3 and 0.9; thin mark: this log alone";
+        let of_ratio = "Last σ over the prior σ; line: the required accuracy; thin mark: this log alone";
         let columns = [
             PlannedColumn::new("parameter", |row| row.last.name.as_str())
                 .means("", "Calibration parameter of the chain; click on a row to select it")
@@ -82,6 +82,11 @@ impl<'a> PlannedRow<'a> {
                 .tone(|row| row.change.map_or(Tone::Weak, change_tone))
                 .optional()
                 .on_screen("Change"),
+            PlannedColumn::new("required", |row| row.last.required)
+                .means("", "Largest σ with which the parameter is known well enough")
+                .text(|row, _| row.shown().sigma(row.last.required))
+                .tone(|_| Tone::Weak)
+                .on_screen("Required"),
             PlannedColumn::new("verdict", |row| row.last.verdict.name())
                 .means("", Determination::RULE)
                 .text(|row, medium| row.last.verdict.shown(medium))

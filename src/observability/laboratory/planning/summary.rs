@@ -24,6 +24,8 @@ pub struct PlannedParameter {
     pub sigma: f64,
     /// `sigma` over `prior_sigma`.
     pub ratio: f64,
+    /// Required accuracy.
+    pub required: f64,
     /// Verdict on the parameter after the motion.
     pub verdict: Determination,
     /// True if the criterion contains it.
@@ -53,20 +55,26 @@ impl PlanTable {
     /// Table after this much information; `None` when a number is not finite.
     pub(super) fn new(situation: &Situation, objective: &Objective, gained: &DMatrix<f64>) -> Option<Self> {
         let (prior, after) = objective.sigmas(gained)?;
+        let alone = objective.sigmas_without_prior(gained)?;
         let scale = situation.scale();
         let parameters: Vec<PlannedParameter> = situation
             .chain
             .parameters()
             .into_iter()
             .enumerate()
-            .map(|(column, parameter)| PlannedParameter {
-                name: situation.names.name(parameter),
-                dimension: parameter.dimension(),
-                prior_sigma: prior[column] * scale[column],
-                sigma: after[column] * scale[column],
-                ratio: if prior[column] > 0.0 { after[column] / prior[column] } else { 1.0 },
-                verdict: Determination::of(after[column], prior[column], objective.is_redundant(column)),
-                matters: objective.is_chosen(column),
+            .map(|(column, parameter)| {
+                let [prior, after, alone] = [prior[column], after[column], alone[column]];
+                let (sigma, required) = (after * scale[column], situation.required.of(parameter));
+                PlannedParameter {
+                    name: situation.names.name(parameter),
+                    dimension: parameter.dimension(),
+                    prior_sigma: prior * scale[column],
+                    sigma,
+                    ratio: if prior > 0.0 { after / prior } else { 1.0 },
+                    required,
+                    verdict: Determination::of(sigma, alone * scale[column], required, objective.is_redundant(column)),
+                    matters: objective.is_chosen(column),
+                }
             })
             .collect();
         let matters: Vec<&PlannedParameter> = parameters.iter().filter(|parameter| parameter.matters).collect();
