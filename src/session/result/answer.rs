@@ -62,6 +62,15 @@ impl RunFinding {
         format!("{}{remedy}", self.statement)
     }
 
+    /// True for a finding of the check about measurements or rig that residuals follow from: it is said before them, also
+    /// where they are worse than it says. Images and motion are rather conditions of a flight, and no residual depends on
+    /// the ground truth.
+    fn is_cause(&self) -> bool {
+        let of_measurements =
+            |finding: &Finding| !matches!(finding.area, Area::Images | Area::Motion) && !is_about_ground_truth(finding);
+        self.checked.as_ref().is_some_and(of_measurements)
+    }
+
     /// Changes of a fork that undo the fault, and the stamp of its first step in nanoseconds since the log began; `None` if
     /// no fault is known or no constant correction undoes it.
     pub fn correction(&self, rig: &Rig) -> Option<(ForkChanges, i64)> {
@@ -125,7 +134,7 @@ impl Answer {
         findings.extend(initialization(run));
         findings.extend(disagreement(run));
         // A stable sort: the sources have the order of what they say about a cause.
-        findings.sort_by_key(|finding| std::cmp::Reverse(finding.trust));
+        findings.sort_by_key(|finding| (!finding.is_cause(), std::cmp::Reverse(finding.trust)));
         let trust = findings.iter().map(|finding| finding.trust).max().unwrap_or_default();
         let requirement = requirement(rig, run);
         let sentence = match (findings.first(), &requirement) {

@@ -117,3 +117,29 @@ fn verdicts_are_withheld_from_the_start_of_the_finding_on() {
     assert_eq!(withheld.verdict(onset_ns - 1, Determination::Determined), Determination::Determined);
     assert_eq!(withheld.verdict(onset_ns, Determination::Determined), Determination::Unknown);
 }
+
+/// Faults of measurements are named before the residuals that follow from them.
+#[test]
+fn a_cause_comes_before_residuals_that_are_worse() {
+    let mut flight = flight();
+    let camera = &mut flight.given_rig.cameras[0];
+    camera.model.intrinsics_px[0] *= 1.3;
+    camera.model.intrinsics_px[1] *= 1.3;
+    let run = recorded(&flight, "auto");
+    let finding = |area: Area| Finding {
+        severity: Severity::Warning,
+        area,
+        title: "imu0 is stamped on arrival".to_owned(),
+        evidence: String::new(),
+        remedy: String::new(),
+        is_assumption: false,
+        faults: Vec::new(),
+    };
+    let of = |area| Answer::of(&flight.given_rig, &[finding(area)], &run);
+    let alone = Answer::of(&flight.given_rig, &[], &run);
+    let by_cause = of(Area::Time);
+    assert_eq!(by_cause.trust, alone.trust);
+    assert!(by_cause.sentence.contains("imu0 is stamped on arrival"), "{}", by_cause.sentence);
+    // Dark images are no cause of residuals that make a run useless.
+    assert!(of(Area::Images).sentence.contains("residuals") == (alone.trust > by_cause.findings[0].trust));
+}
