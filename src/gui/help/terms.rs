@@ -132,7 +132,7 @@ pub(crate) mod parameter {
         CHANGE: "change since the start" => "Estimate minus initial value; angles in (−180°, 180°].";
         GROUND_TRUTH: "ground truth" => "True value from NAME.truth.yaml, converted to the parameterization of the run.";
         ERROR: "error" => "Estimate minus ground truth, and its absolute value in posterior σ. Above 3 σ the estimate is inconsistent.";
-        VERDICT_HERE: "at the cursor" => "Verdict from σ of this step and the required accuracy. Determined: the measurements alone reach it; given: only together with the prior; weakly determined: up to 3 times it; not determined: more; redundant: by the parameterization; unknown: the run is not trusted.";
+        VERDICT_HERE: "at the cursor" => "Verdict from σ of this step and the required accuracy: determined by the measurements alone, given with the prior, weakly determined up to 3 times it, else not determined. Redundant: by the parameterization; unknown: the run is not trusted.";
         VERDICT: "whole flight" => "The same verdict at the end of the flight, and the time from which it holds without interruption.";
     }
 }

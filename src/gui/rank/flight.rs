@@ -30,7 +30,7 @@ pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, run: &RunRecord, heigh
     }
     let Some(least) = least else { return };
     let name = if low { format!("{span} ") } else { "Least determined: ".to_owned() };
-    let ratio = least.of_required().map_or_else(String::new, |ratio| format!(" (σ {} × required)", fixed(ratio, 2)));
+    let ratio = least.of_required().map_or_else(String::new, |ratio| format!(" ({} × required)", fixed(ratio, 1)));
     let line = format!("{} {}{ratio}", look_of(least.verdict, &theme).0, least.name);
     let meaning = format!("{headline}\nLeast determined: {}, {}", least.name, least.verdict_text());
     if fact_at_ui(ui, ctx, &name, &line, least.since_ns, &meaning) {

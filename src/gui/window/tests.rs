@@ -429,7 +429,7 @@ fn the_verdict_of_the_flight_does_not_depend_on_the_cursor() {
     let rows = flight_table(&harness.state().recording, &harness.state().recording.runs[0]);
     let least = least_determined(&rows).expect("some parameter is not determined").clone();
     let line = format!(
-        "{} (σ {:.2} × required) since {:.2} s",
+        "{} ({:.1} × required) since {:.2} s",
         least.name,
         least.of_required().unwrap(),
         least.since_s().unwrap()
