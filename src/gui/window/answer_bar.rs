@@ -6,7 +6,7 @@ use super::actions::Action;
 use crate::gui::theme::{MAX_RUNS, Theme};
 use crate::gui::{Dialog, PanelContext};
 use crate::log_check::Trust;
-use crate::session::{Answer, Command, FindingSource};
+use crate::session::{Answer, Command, FindingSource, Recording, RunRecord};
 
 /// Height of the bar in points.
 pub(super) const HEIGHT: f32 = 30.0;
@@ -21,22 +21,36 @@ pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, actions: &mut Vec<Acti
     let answer = ctx.answer(run);
     let theme = *ctx.theme;
     ui.with_layout(UiLayout::right_to_left(Align::Center), |ui| {
-        if ctx.recording.check.is_none() && ctx.recording.is_computing() {
-            ui.label(RichText::new("checking the log…").small().color(theme.text_weak));
+        let pending = pending(ctx.recording, run, &answer);
+        if pending.is_none() {
+            buttons_ui(ui, ctx, &answer, actions);
         }
-        buttons_ui(ui, ctx, &answer, actions);
         ui.with_layout(UiLayout::left_to_right(Align::Center), |ui| {
             let several = ctx.recording.runs.len() > 1;
             let of_run = if several { format!("{}  ", run.spec.label) } else { String::new() };
-            let sentence = RichText::new(format!("{of_run}{}", answer.sentence)).size(SENTENCE_SIZE);
-            let label = ui.add(Label::new(sentence.color(color(&answer, &theme)).strong()).truncate());
+            let (text, color) = match pending {
+                Some(pending) => (pending, theme.text_weak),
+                None => (answer.sentence.as_str(), color(&answer, &theme)),
+            };
+            let sentence = RichText::new(format!("{of_run}{text}")).size(SENTENCE_SIZE);
+            let label = ui.add(Label::new(sentence.color(color).strong()).truncate());
             label.on_hover_text(hover_text(&answer));
-            if !answer.remedy.is_empty() && ui.available_width() > LEAST_REMEDY_WIDTH {
+            if pending.is_none() && !answer.remedy.is_empty() && ui.available_width() > LEAST_REMEDY_WIDTH {
                 let remedy = RichText::new(&answer.remedy).color(theme.text);
                 ui.add(Label::new(remedy).truncate()).on_hover_text(&answer.remedy);
             }
         });
     });
+}
+
+/// Sentence in place of an answer that is still going to change: the check may name a cause of what the run shows, and the
+/// number of accurate parameters grows with every step. Residuals that disagree are said as soon as the check has ended.
+fn pending(recording: &Recording, run: &RunRecord, answer: &Answer) -> Option<&'static str> {
+    if recording.is_being_checked {
+        return Some("… Checking the log beside the runs");
+    }
+    let is_computing = !run.has_ended() && answer.trust == Trust::Trusted;
+    is_computing.then_some("… Computing; so far nothing speaks against this run")
 }
 
 /// Draws the buttons of the first finding, from right to left.
@@ -90,6 +104,21 @@ mod tests {
     use crate::gui::window::tests::{bench, bench_of, commands_of, sample};
     use crate::log_check::Finding;
     use crate::session::Command;
+
+    #[test]
+    fn an_answer_that_is_going_to_change_is_not_said() {
+        let sentence = |checked: bool, finished: bool| {
+            let mut recording = sample();
+            recording.is_being_checked = !checked;
+            recording.runs[0].finished = finished;
+            let harness = bench_of(recording, [1600.0, 900.0]);
+            let starts = ["… Checking the log", "… Computing; so far", "⚠ "];
+            let label = |start: &&str| harness.query_all_by_label_contains(&format!("  {start}")).next().is_some();
+            starts.iter().position(label)
+        };
+        let all = [(false, false), (false, true), (true, false), (true, true)];
+        assert_eq!(all.map(|(checked, finished)| sentence(checked, finished)), [Some(0), Some(0), Some(1), Some(2)]);
+    }
 
     #[test]
     fn the_bar_names_the_fault_and_its_button_corrects_it() {

@@ -71,7 +71,13 @@ impl Computation {
 
     /// Stores the findings of the check of the log and its rig, on which the answers of the runs depend.
     pub fn set_check(&mut self, findings: Vec<Finding>) {
-        self.recording_mut().check = Some(Arc::new(findings));
+        let recording = self.recording_mut();
+        (recording.check, recording.is_being_checked) = (Some(Arc::new(findings)), false);
+    }
+
+    /// The check of the log has been started beside the runs.
+    pub(in crate::session) fn begin_check(&mut self) {
+        self.recording_mut().is_being_checked = true;
     }
 
     /// Accuracy with which the calibration is compared from now on.

@@ -78,6 +78,7 @@ impl SharedComputation {
         &self,
     ) -> (impl Fn() -> bool + Send + 'static, impl FnOnce(Vec<Finding>) + Send + 'static) {
         let (state, known) = (Arc::clone(&self.state), Arc::clone(&self.state));
+        self.change(Computation::begin_check);
         let has_begun = move || known.computation.lock().recording().runs.iter().any(|run| !run.steps.is_empty());
         let store = move |findings| {
             state.change(|computation| computation.set_check(findings));

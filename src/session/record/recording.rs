@@ -37,6 +37,8 @@ pub struct Recording {
     pub trajectories: Vec<Arc<TrajectoryLane>>,
     /// Findings of the check of the log and its rig, most severe first; `None` as long as they are not known.
     pub check: Option<Arc<Vec<Finding>>>,
+    /// True while the log and its rig are being checked beside the runs.
+    pub is_being_checked: bool,
     /// Warnings about the log so far, in time order.
     pub warnings: Vec<LogWarning>,
     pub memory_budget_bytes: usize,
@@ -100,6 +102,7 @@ impl Recording {
             position_truth: position_truth.clone(),
             trajectories: plan.trajectories.iter().map(|loaded| Arc::new(lane(loaded))).collect(),
             check: None,
+            is_being_checked: false,
             warnings: Vec::new(),
             memory_budget_bytes: plan.memory_budget_bytes,
         };
