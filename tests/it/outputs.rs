@@ -95,6 +95,26 @@ fn outputs_that_cannot_be_written_are_noticed_before_the_work() {
 }
 
 #[test]
+fn a_required_accuracy_has_an_exit_code_of_its_own() {
+    let folder = folder();
+    let run = |require: &str, code: i32, words: &[&str]| {
+        let arguments =
+            ["run", "garden.mcap", "--out", "out", "--force", "--duration", "3.5", "--no-check", "--json", require];
+        check(folder.path(), &arguments, code, words);
+    };
+    run("--require", 7, &[]);
+    let summary = fs::read_to_string(folder.path().join("out/auto/summary.json")).unwrap();
+    let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
+    let requirement = &summary["answer"]["requirement"];
+    assert!(requirement["met"].as_u64() < requirement["parameters"].as_u64(), "{requirement}");
+    assert_eq!(requirement["required"], "5 mm and 0.1°");
+    run("--require=translation=1m,rotation=60deg", 0, &[]);
+    run("--require=translation=1m,rotation=60deg,yaw.a=1e-6mm", 7, &[]);
+    run("--require=rotation=-1deg", 1, &["rotation: '-1deg' is no positive number"]);
+    run("--require=knee.a=1mm", 1, &["'knee.a' is no parameter"]);
+}
+
+#[test]
 fn scripts_can_tell_the_ends_of_commands_apart() {
     let folder = folder();
     let run = ["run", "garden.mcap", "--out", "out"];
