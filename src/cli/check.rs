@@ -9,10 +9,10 @@ use dcvins::export;
 use dcvins::flight_log::FlightLog;
 use dcvins::log_check::{self, Severity};
 use dcvins::sensors::Rig;
-use dcvins::session;
 
 use crate::cli::exit::ExitOutcome;
 use crate::cli::prepared_log::prepare;
+use crate::cli::result_cache::CacheArguments;
 use crate::cli::shared_arguments::LimitArguments;
 use crate::cli::terminal::{Progress, notify, print_report};
 
@@ -34,6 +34,8 @@ pub(crate) struct CheckArguments {
     pub json: bool,
     #[command(flatten)]
     pub limits: LimitArguments,
+    #[command(flatten)]
+    pub cache: CacheArguments,
 }
 
 pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitOutcome> {
@@ -46,8 +48,10 @@ pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitOutcome> {
         Ok((rig, unused_keys)) => (Ok(rig), unused_keys),
         Err(error) => (Err(error), Vec::new()),
     };
-    let rotations = rig.as_ref().map_or_else(|_| Vec::new(), |rig| session::image_rotations(&log, rig));
-    let mut report = log_check::check(&log, rig.as_ref(), &rotations);
+    let mut report = match &rig {
+        Ok(rig) => export::check_log(arguments.cache.cache().as_ref(), &log, rig),
+        Err(error) => log_check::check(&log, Err(error), &[]),
+    };
     report.add_unused_rig_keys(&unused_keys);
     log.require_unshortened()?;
     drop(progress);

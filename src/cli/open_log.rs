@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use dcvins::export::{
-    ConvertedLogs, LogSources, PreparedLog, SourceError, is_session, open_session, prepare_log, prepare_session,
-    read_session,
+    ConvertedLogs, LogSources, PreparedLog, SourceError, check_log, is_session, open_session, prepare_log,
+    prepare_session, read_session,
 };
 use dcvins::files::LogLimits;
 use dcvins::flight_log::convert::SourceKind;
@@ -17,6 +17,7 @@ use dcvins::text::log_name;
 
 use crate::cli::estimation_arguments::EstimationArguments;
 use crate::cli::prepared_log::{converted_logs, stage_text};
+use crate::cli::result_cache::CacheArguments;
 
 /// Largest number of notes of a conversion that are shown; its report has all.
 const SHOWN_NOTES: usize = 3;
@@ -42,7 +43,7 @@ pub(crate) fn open_log(
             });
         let saved = saved.map_err(|error| failure(&error))?;
         let mut session = open_session(&saved, &sources.main).map_err(|error| problem(error.to_string()))?;
-        session.check_in_background().map_err(|error| problem(error.to_string()))?;
+        check(&mut session).map_err(|error| problem(error.to_string()))?;
         return Ok(OpenedLog { log: Box::new(session), remembered: sources.main, notices: Vec::new() });
     }
     let sources = LogSources { rig: request.rig.clone().or(sources.rig), ..sources };
@@ -66,7 +67,7 @@ pub(crate) fn open_log(
     }
     let started = SessionPlan::open(&session_request).and_then(|plan| {
         let mut session = Session::start(plan)?;
-        session.check_in_background()?;
+        check(&mut session)?;
         Ok(session)
     });
     match started {
@@ -81,6 +82,12 @@ pub(crate) fn open_log(
         }
         Err(error) => Err(OpenFailure::Problem(error.to_string())),
     }
+}
+
+/// Checks the log of a session in the background.
+fn check(session: &mut Session) -> Result<(), SessionError> {
+    let cache = CacheArguments::default().cache();
+    session.check_in_background(move |log, rig| check_log(cache.as_ref(), log, rig))
 }
 
 fn failure(error: &SourceError) -> OpenFailure {

@@ -72,7 +72,7 @@ pub(crate) fn report(arguments: &ReportArguments) -> Result<ExitOutcome> {
         return Ok(ExitOutcome::Success);
     }
     let plan = SessionPlan { interrupted: interrupt.flag(), ..plan.clone() };
-    let (computed, checked) = beside_check(&plan, || {
+    let (computed, checked) = beside_check(&plan, &arguments.cache, || {
         let mut computation = compute(&plan, None)?;
         if interrupt.is_set() && computation.recording().runs.iter().all(|run| run.steps.is_empty()) {
             return Ok(None);

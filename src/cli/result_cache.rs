@@ -1,4 +1,4 @@
-//! `--no-cache`: cached screenshots and reports, reused for the same command on the same files.
+//! `--no-cache`: cached screenshots, reports and checks, reused for the same command on the same files.
 
 use std::path::{Path, PathBuf};
 
@@ -41,16 +41,19 @@ impl CacheArguments {
         estimation: &EstimationArguments,
         plan: &SessionPlan,
     ) -> Option<CachedResult> {
-        if self.no_cache {
-            return None;
-        }
-        let cache = match std::env::var_os(FOLDER_VARIABLE) {
-            Some(folder) if folder.is_empty() => return None,
-            Some(folder) => ResultCache::in_folder(PathBuf::from(folder)),
-            None => ResultCache::of_user()?,
-        };
+        let cache = self.cache()?;
         let key = key(options, log, estimation, plan)?;
         Some(CachedResult { cache, key, written: Some(Vec::new()), bytes: 0 })
+    }
+
+    /// The cache; `None` with `--no-cache`, with an empty folder name, or without a home folder.
+    pub(crate) fn cache(&self) -> Option<ResultCache> {
+        match std::env::var_os(FOLDER_VARIABLE) {
+            _ if self.no_cache => None,
+            Some(folder) if folder.is_empty() => None,
+            Some(folder) => Some(ResultCache::in_folder(PathBuf::from(folder))),
+            None => ResultCache::of_user(),
+        }
     }
 }
 

@@ -17,6 +17,7 @@ use crate::cli::exit::ExitOutcome;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::log_checking::beside_check;
 use crate::cli::prepared_log::prepared_log;
+use crate::cli::result_cache::CacheArguments;
 use crate::cli::run_summary::{describe, describe_trajectory};
 use crate::cli::terminal::{notify, print, print_json};
 
@@ -29,6 +30,8 @@ pub(crate) struct RunArguments {
     pub out: PathBuf,
     #[command(flatten)]
     pub estimation: EstimationArguments,
+    #[command(flatten)]
+    pub cache: CacheArguments,
     /// Stop when this condition becomes true in a run, as in "rank < 18 or features < 40", write the files up to that
     /// step and print the values; docs/manual.md lists the quantities.
     #[arg(long = "break", value_name = "CONDITION", value_parser = condition)]
@@ -81,7 +84,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitOutcome> {
     let (recording, hit) = if arguments.no_check {
         estimate()?
     } else {
-        let (computed, checked) = beside_check(&plan, estimate);
+        let (computed, checked) = beside_check(&plan, &arguments.cache, estimate);
         let (recording, hit) = computed?;
         (Recording { check: Some(Arc::new(checked.findings)), ..recording }, hit)
     };

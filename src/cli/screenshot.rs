@@ -6,8 +6,8 @@ use std::sync::Arc;
 use anyhow::{Context as _, Result, bail};
 use clap::{Args, ValueEnum};
 use dcvins::export::{
-    PANEL_NAMES, Renderer, STUDY_PANEL_NAMES, ScreenshotOptions, check_screenshot, draw_panel, draw_panel_svg,
-    figure_bytes, is_session, open_session, panel_csv, png_bytes, read_motion, write_screenshot,
+    PANEL_NAMES, Renderer, STUDY_PANEL_NAMES, ScreenshotOptions, check_log, check_screenshot, draw_panel,
+    draw_panel_svg, figure_bytes, is_session, open_session, panel_csv, png_bytes, read_motion, write_screenshot,
 };
 use dcvins::flight_log::ImageReader;
 use dcvins::geometry::{ns_from_seconds, seconds_from_ns};
@@ -212,7 +212,8 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<ExitOutcome>
         }
         return Ok(ExitOutcome::Success);
     }
-    let mut computation = shown.compute(instants.last_ns, &interrupt, arguments.panel == "all")?;
+    let mut computation =
+        shown.compute(instants.last_ns, &interrupt, (arguments.panel == "all").then_some(&arguments.cache))?;
     if interrupt.is_set() {
         return stopped(0);
     }
@@ -456,22 +457,25 @@ impl Shown {
 
     /// Computes the runs up to a stamp; runs of a saved session are computed to their end. For the whole window, the log is
     /// checked as well.
-    fn compute(&mut self, until_ns: i64, interrupt: &Interrupt, with_check: bool) -> Result<Computation> {
+    fn compute(
+        &mut self,
+        until_ns: i64,
+        interrupt: &Interrupt,
+        checked_with: Option<&CacheArguments>,
+    ) -> Result<Computation> {
         match &mut self.source {
             Source::Log(plan, _) => {
                 plan.interrupted = interrupt.flag();
-                if !with_check {
-                    return compute(plan, Some(until_ns));
-                }
-                let (computed, checked) = beside_check(plan, || compute(plan, Some(until_ns)));
+                let Some(cache) = checked_with else { return compute(plan, Some(until_ns)) };
+                let (computed, checked) = beside_check(plan, cache, || compute(plan, Some(until_ns)));
                 let mut computation = computed?;
                 computation.set_check(checked.findings);
                 Ok(computation)
             }
             Source::Saved(session) => {
                 session.finish();
-                if with_check {
-                    session.check_log();
+                if let Some(cache) = checked_with {
+                    session.check_log(|log, rig| check_log(cache.cache().as_ref(), log, rig));
                 }
                 session.take_notices().iter().for_each(|notice| notify(&format!("dcvins: {notice}")));
                 Ok(session.computation())

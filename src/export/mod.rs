@@ -2,6 +2,7 @@
 
 pub(crate) mod calibration_files;
 pub(crate) mod calibration_report;
+mod check_cache;
 mod error;
 mod euroc;
 mod evaluation;
@@ -35,6 +36,7 @@ mod video_alignment;
 pub use self::screenshot::figure_bytes;
 pub use calibration_files::write_calibration;
 pub use calibration_report::{CalibrationReport, report_calibration};
+pub use check_cache::check_log;
 pub use error::ExportError;
 pub use euroc::{EurocCamera, EurocReport, check_euroc_folder, write_euroc};
 pub use evaluation::{EvaluationOptions, EvaluationReport, evaluate};

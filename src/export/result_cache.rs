@@ -1,5 +1,5 @@
-//! Cache of screenshots and reports of earlier commands, so that the same command on the same files returns
-//! immediately.
+//! Cache of the results of earlier commands, such as screenshots, reports and checks, so that the same command on the same
+//! files returns immediately.
 //!
 //! The name of an entry is the SHA-256 of everything on which its content depends: the program itself, the content of
 //! the input files and the options. An entry contains the files written by the command; its own SHA-256 is checked when
@@ -68,8 +68,18 @@ impl ResultKeyBuilder {
 
     /// Adds an option to the key.
     pub fn add_text(&mut self, text: &str) {
-        self.hash.update((text.len() as u64).to_le_bytes());
-        self.hash.update(text);
+        self.add_bytes(text.as_bytes());
+    }
+
+    pub(super) fn add_bytes(&mut self, bytes: &[u8]) {
+        self.hash.update((bytes.len() as u64).to_le_bytes());
+        self.hash.update(bytes);
+    }
+
+    /// Adds a file whose content is in the key already, or is added later: its result is not stored if it changes from now
+    /// on.
+    pub(super) fn watch(&mut self, path: &Path) {
+        self.inputs.push((path.to_owned(), state_of(path)));
     }
 
     /// Adds the content of a file.
@@ -77,7 +87,7 @@ impl ResultKeyBuilder {
     /// # Errors
     /// If the file cannot be read.
     pub fn add_file(&mut self, path: &Path) -> io::Result<()> {
-        self.inputs.push((path.to_owned(), state_of(path)));
+        self.watch(path);
         let bytes = file_hash::add_file(&mut self.hash, path)?;
         // The length separates the contents of consecutive files.
         self.hash.update(bytes.to_le_bytes());

@@ -1,13 +1,14 @@
 //! A fault of the measurements or of the rig with its values.
 
 use nalgebra::{UnitQuaternion, Vector2, Vector3};
+use serde::{Deserialize, Serialize};
 
 use super::table::{Change, FaultKind, LONGEST_SHIFT_S, Parameter, Part};
 use crate::geometry::{SignedAxes, so3};
 use crate::text::Named;
 
 /// One of a few changes that have no number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Choice {
     Flip(ImageFlip),
     Half(ImageHalf),
@@ -19,7 +20,7 @@ pub enum Choice {
 ///
 /// Its values undo it: they are the factors on what is recorded or given by the rig, or the additions to it, that give the
 /// true value. [`Fault::inverse`] plants it.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Fault {
     pub kind: FaultKind,
     /// Key of the faulty camera; `None` for the main camera of a run and for other sensors.
@@ -34,7 +35,7 @@ pub struct Fault {
 }
 
 /// Image operation that undoes a camera mounted or recorded the other way around.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ImageFlip {
     /// Left and right exchanged.
     Mirrored,
@@ -50,7 +51,7 @@ impl Named for ImageFlip {
 }
 
 /// Half of an image.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ImageHalf {
     Left,
     Right,

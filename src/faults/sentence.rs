@@ -3,7 +3,7 @@
 
 use std::f64::consts::PI;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::apply::joint_maps;
 use super::fault::{Choice, Fault};
@@ -13,7 +13,7 @@ use crate::sensors::{CameraRig, Rig, STANDARD_GRAVITY_M_PER_S2};
 use crate::text::Named as _;
 
 /// Severity of a finding.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
     Good,

@@ -2,13 +2,13 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::sensors::STANDARD_GRAVITY_M_PER_S2;
 use crate::text::Named;
 
 /// Kind of a fault; its row is in [`TABLE`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum FaultKind {
     /// Values: factor on the focal lengths.
     Focal,
@@ -74,7 +74,7 @@ pub enum Sensor {
 }
 
 /// Subject of a finding.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Area {
     /// The file and its topics.

@@ -4,6 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
 
 /// Largest angle between an axis and its nearest signed axis, in radians.
 const TOLERANCE_RAD: f64 = 0.35;
@@ -11,7 +12,7 @@ const NAMES: [&str; 3] = ["x", "y", "z"];
 
 /// Axes of one frame as signed axes of another: axis `i` is `sign(i)` times axis `source(i)` of the other frame, as
 /// `(source, negative)`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SignedAxes([(usize, bool); 3]);
 
 impl SignedAxes {

@@ -61,7 +61,21 @@ fn a_report_of_the_same_command_is_the_same() {
         ["report.html", "report.json", "auto/summary.json", "auto/frames.csv"].map(read)
     };
     let first = write();
-    assert_eq!(entries(&cache).len(), 1);
+    // The report and the check of its log.
+    assert_eq!(entries(&cache).len(), 2);
     fs::write(report.join("auto/frames.csv"), "spoiled").unwrap();
     assert_eq!(write(), first);
+}
+
+#[test]
+fn a_log_is_checked_once_for_all_commands() {
+    let folder = tempfile::tempdir().unwrap();
+    let (cache, out) = (folder.path().join("cache"), folder.path().join("out"));
+    let checked = |options: &[&str]| run(&cache, &[&["check", LOG], options].concat()).stdout;
+    let (text, json) = (checked(&["--no-cache"]), checked(&["--no-cache", "--json"]));
+    assert_eq!(entries(&cache).len(), 0);
+    run(&cache, &["run", LOG, "--duration", "1", "-o", out.to_str().unwrap()]);
+    let entry = entries(&cache);
+    assert_eq!((checked(&[]), checked(&["--json"])), (text, json));
+    assert_eq!((entry.len(), entries(&cache)), (1, entry));
 }

@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 
 use nalgebra::UnitQuaternion;
 use serde::ser::SerializeStruct as _;
-use serde::{Serialize, Serializer};
+use serde::{Deserialize, Serialize, Serializer};
 
 use crate::faults::Fault;
 pub use crate::faults::{Area, Severity};
@@ -15,7 +15,7 @@ use crate::frontend::readout::RowTrack;
 use crate::sensors::ImageMask;
 use crate::text::without_signed_zeros;
 
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Finding {
     pub severity: Severity,
     pub area: Area,
@@ -40,7 +40,7 @@ impl Finding {
     }
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TopicReport {
     pub topic: String,
     /// Message type, such as `sensor_msgs/msg/Imu`.
@@ -73,7 +73,7 @@ pub struct ImageRotation {
 }
 
 /// Result of [`check`](super::check); as JSON it begins with the verdict.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Deserialize)]
 pub struct CheckReport {
     pub log: String,
     /// Name of the rig, `None` without a readable one.
@@ -86,7 +86,8 @@ pub struct CheckReport {
     pub topics: Vec<TopicReport>,
     /// Most severe first, then by area.
     pub findings: Vec<Finding>,
-    /// Masks for cameras with the vehicle in view.
+    /// Masks for cameras with the vehicle in view; not part of the JSON.
+    #[serde(skip)]
     pub proposed_masks: Vec<ProposedMask>,
 }
 

@@ -13,7 +13,7 @@ use super::tuning::rounded;
 use crate::faults::{Fault, FaultKind, Sensor, Severity};
 use crate::flight_log::FlightLog;
 use crate::geometry::ns_from_seconds;
-use crate::log_check::Finding;
+use crate::log_check::{Finding, Verdict};
 use crate::sensors::Rig;
 use crate::session::engine::check_log;
 
@@ -108,6 +108,11 @@ pub struct LogFaults {
 }
 
 impl LogFaults {
+    /// Faults among the findings of a check.
+    pub fn among(findings: &[Finding]) -> Self {
+        Self { found: OnceCell::from(Verdict::of(findings).first) }
+    }
+
     /// At most three errors and warnings of the check, those with the largest effect on a result first; none if the log can
     /// no longer be read.
     pub(super) fn of(&self, log_path: &Path, rig: &Rig) -> &[Finding] {

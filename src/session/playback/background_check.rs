@@ -7,26 +7,22 @@ use std::time::Duration;
 
 use rayon::ThreadPoolBuilder;
 
-use crate::flight_log::FlightLog;
-use crate::log_check::{self, Finding};
-use crate::sensors::Rig;
-use crate::session::engine::image_rotations;
+use crate::log_check::Finding;
 use crate::session::plan::SessionError;
 
 /// Time between two looks for the first step of a run, before which the check does not begin.
 const WAIT: Duration = Duration::from_millis(50);
 
-/// A check on its thread. Dropping it discards its result; the thread ends after the part that it computes.
+/// A check on its thread. Dropping it discards its result; a check that has begun goes on to its end.
 #[derive(Debug)]
 pub(super) struct BackgroundCheck {
     cancelled: Arc<AtomicBool>,
 }
 
 impl BackgroundCheck {
-    /// Starts the check on one core as soon as `has_begun`, so that it delays no first image; `store` gets the findings.
+    /// Starts `check` on one core as soon as `has_begun`, so that it delays no first image; `store` gets its findings.
     pub(super) fn start(
-        log: Arc<FlightLog>,
-        rig: Arc<Rig>,
+        check: impl FnOnce() -> Vec<Finding> + Send + 'static,
         has_begun: impl Fn() -> bool + Send + 'static,
         store: impl FnOnce(Vec<Finding>) + Send + 'static,
     ) -> Result<Self, SessionError> {
@@ -40,15 +36,11 @@ impl BackgroundCheck {
                 }
                 std::thread::sleep(WAIT);
             }
-            let checked = || {
-                let rotations = image_rotations(&log, &rig);
-                (!is_cancelled()).then(|| log_check::check(&log, Ok(&rig), &rotations).findings)
+            let findings = match ThreadPoolBuilder::new().num_threads(1).build() {
+                Ok(pool) => pool.install(check),
+                Err(_no_threads) => check(),
             };
-            let found = match ThreadPoolBuilder::new().num_threads(1).build() {
-                Ok(pool) => pool.install(checked),
-                Err(_no_threads) => checked(),
-            };
-            if let Some(findings) = found.filter(|_| !is_cancelled()) {
+            if !is_cancelled() {
                 store(findings);
             }
         };

@@ -47,7 +47,9 @@ impl BackgroundDiagnosis {
                 (progress.ratio, progress.label) = (ratio, label.to_owned());
                 if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             };
-            let found = diagnose(&computation, run, &LogFaults::default(), &mut on_progress);
+            let checked = computation.recording().check.as_deref();
+            let faults = checked.map_or_else(LogFaults::default, |findings| LogFaults::among(findings));
+            let found = diagnose(&computation, run, &faults, &mut on_progress);
             let mut progress = shared.lock();
             (progress.ratio, progress.result) = (1.0, found.map(Arc::new));
         };

@@ -11,10 +11,12 @@ use super::cursor::{Cursor, MoveOutcome};
 use super::markers::Markers;
 use super::saved::PendingRestore;
 use super::shared::{SharedComputation, Wake};
-use crate::flight_log::ImageReader;
+use crate::flight_log::{FlightLog, ImageReader};
 use crate::geometry::ns_from_seconds;
+use crate::log_check::CheckReport;
+use crate::sensors::Rig;
 use crate::session::breakpoints::{Breakpoints, Condition};
-use crate::session::engine::{Computation, Engine, RecomputeThread, check_log};
+use crate::session::engine::{Computation, Engine, RecomputeThread};
 use crate::session::plan::{SessionError, SessionPlan, SessionRequest};
 use crate::session::record::{Recording, SolverPosition};
 
@@ -81,20 +83,25 @@ impl Session {
         })
     }
 
-    /// Checks the log and its rig on a thread of its own, after the first step; the findings appear in the record.
+    /// Calls `check` with the log and its rig on a thread of its own, after the first step; the findings appear in the
+    /// record.
     ///
     /// # Errors
     /// If no thread can be started.
-    pub fn check_in_background(&mut self) -> Result<(), SessionError> {
+    pub fn check_in_background(
+        &mut self,
+        check: impl FnOnce(&Arc<FlightLog>, &Rig) -> CheckReport + Send + 'static,
+    ) -> Result<(), SessionError> {
         let (has_begun, store) = self.shared.receiver_of_check();
         let (log, rig) = (Arc::clone(&self.plan.log), Arc::clone(&self.plan.rig));
-        self.check = Some(BackgroundCheck::start(log, rig, has_begun, store)?);
+        let check = move || check(&log, &rig).findings;
+        self.check = Some(BackgroundCheck::start(check, has_begun, store)?);
         Ok(())
     }
 
-    /// Checks the log and its rig; returns when the findings are in the record.
-    pub fn check_log(&self) {
-        let checked = check_log(&self.plan.log, &self.plan.rig);
+    /// Calls `check` with the log and its rig; returns when the findings are in the record.
+    pub fn check_log(&self, check: impl FnOnce(&Arc<FlightLog>, &Rig) -> CheckReport) {
+        let checked = check(&self.plan.log, &self.plan.rig);
         self.shared.change(|computation| computation.set_check(checked.findings));
     }
 
