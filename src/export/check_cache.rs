@@ -100,7 +100,7 @@ mod tests {
     use super::*;
     use crate::faults::{Choice, FaultKind, ImageFlip};
     use crate::geometry::SignedAxes;
-    use crate::log_check::{Area, Finding, Severity};
+    use crate::log_check::{Area, Finding, FindingInterval, Severity};
     use crate::simulation::{Experiment, SimulationOptions, simulate};
 
     fn short_log(folder: &Path) -> (Arc<FlightLog>, Rig) {
@@ -132,6 +132,7 @@ mod tests {
             title: "a \"title\" of ±3°".to_owned(),
             evidence: "3 of 7".to_owned(),
             remedy: String::new(),
+            interval: FindingInterval { since_s: Some(0.1 + 0.2), until_s: None },
             is_assumption,
             faults,
         };

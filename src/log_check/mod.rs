@@ -30,4 +30,6 @@ pub use self::noise::{
     AllanPoint, AllanReport, AxisNoise, GivenNoise, NoiseTerm, NoiseTerms, SensorNoise, measure_noise,
 };
 pub use self::report::verdict::{Trust, Verdict, joint_statement, problems};
-pub use self::report::{Area, CheckReport, Finding, ImageRotation, ProposedMask, Severity, TopicReport};
+pub use self::report::{
+    Area, CheckReport, Finding, FindingInterval, ImageRotation, ProposedMask, Severity, TopicReport,
+};

@@ -1,7 +1,7 @@
 use nalgebra::Vector2;
 
 use super::extrinsics::MAX_LEVER_M;
-use super::report::{Area, CheckReport, Finding, Findings, Severity};
+use super::report::{Area, CheckReport, Finding, FindingInterval, Findings, Severity};
 use crate::camera::{CameraModel, Projection};
 use crate::flight_log::FlightLog;
 use crate::sensors::{AssumedField, CameraRig, ChainPrior, GimbalRig, Rig};
@@ -41,6 +41,7 @@ impl CheckReport {
             title: "keys of the rig that are not used".to_owned(),
             evidence: keys.join(", "),
             remedy: String::new(),
+            interval: FindingInterval::default(),
             is_assumption: false,
             faults: Vec::new(),
         };

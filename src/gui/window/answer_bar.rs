@@ -102,7 +102,7 @@ mod tests {
 
     use crate::faults::{Area, Fault, FaultKind, Severity};
     use crate::gui::window::tests::{bench, bench_of, commands_of, sample};
-    use crate::log_check::Finding;
+    use crate::log_check::{Finding, FindingInterval};
     use crate::session::Command;
 
     #[test]
@@ -131,6 +131,7 @@ mod tests {
             title: title.to_owned(),
             evidence: "rotations differ by 2.6°".to_owned(),
             remedy: "reverse the sign of the readings of 'yaw' in the driver".to_owned(),
+            interval: FindingInterval::default(),
             is_assumption: false,
             faults: vec![Fault::from(FaultKind::JointReversed).of_joints(&["yaw".to_owned()])],
         }]));

@@ -70,6 +70,7 @@ fn check_joint(joint: &Joint, readings: &[(i64, f64)], imu: &ImuFacts, findings:
     let remedy = "the driver repeats its last reading: check the connection of the encoder; use --duration or --start to \
                   run on the log outside of these intervals";
     findings.add(Severity::Error, Area::Encoders, title, evidence, remedy);
+    findings.state_interval(frozen.iter().flat_map(|interval| interval.iter().map(|(stamp_ns, _)| *stamp_ns)));
     findings.state_faults([FaultKind::UnusableJoints.into()]);
     findings.exclude(Measurement::Joints);
 }

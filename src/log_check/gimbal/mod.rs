@@ -297,5 +297,6 @@ pub(crate) fn check_joint_coverage(survey: &Survey, rig: &Rig, findings: &mut Fi
                       without them the camera's orientation is estimated from its images alone";
         let severity = if ratio > USELESS_MISSING_RATIO { Severity::Error } else { Severity::Warning };
         findings.add(severity, Area::Encoders, title, evidence, remedy);
+        if what == "begin" { findings.state_times(None, Some(at_s)) } else { findings.state_times(Some(at_s), None) }
     }
 }

@@ -81,6 +81,7 @@ pub(crate) fn check_vehicle_attitude(survey: &Survey, rig: &Rig, imu_facts: &Imu
         let largest_rad = steps.iter().map(|step| step.change_rad.abs()).fold(0.0, f64::max);
         let severity = if largest_rad > USELESS_STEP_RAD { Severity::Error } else { Severity::Warning };
         findings.add(severity, Area::Encoders, title, scatter, remedy);
+        findings.state_times(steps.first().map(|step| seconds_from_ns(step.at_ns)), None);
         findings.state_faults([FaultKind::UnusableJoints.into()]);
     }
     if source.frame == AttitudeFrame::Earth {

@@ -152,6 +152,7 @@ fn check_blur(camera: &CameraRig, images: &[SampledImage], findings: &mut Findin
         let evidence = format!("{} of {} images, at {}; {evidence}", blurred.len(), images.len(), times.join(", "));
         let remedy = "shorten the exposure, add light or rotate more slowly; tracks are lost there";
         findings.add(Severity::Warning, Area::Images, title, evidence, remedy);
+        findings.state_interval(blurred.iter().map(|image| image.stamp_ns));
     } else {
         findings.good(Area::Images, format!("the images of {} are sharp", camera.key), evidence);
     }
@@ -187,7 +188,8 @@ fn check_exposure(camera: &CameraRig, images: &[SampledImage], findings: &mut Fi
 
 fn check_texture(camera: &CameraRig, images: &[SampledImage], findings: &mut Findings) {
     let ratios: Vec<f64> = images.iter().map(|image| image.measure.texture).collect();
-    let poor = ratios.iter().filter(|ratio| **ratio < MIN_TEXTURE).count();
+    let poor_images = images.iter().filter(|image| image.measure.texture < MIN_TEXTURE);
+    let poor = poor_images.clone().count();
     let evidence = format!(
         "{:.1} % of the pixels have texture in the median image, {:.1} % in the poorest",
         median(&ratios) * 100.0,
@@ -198,6 +200,7 @@ fn check_texture(camera: &CameraRig, images: &[SampledImage], findings: &mut Fin
         let evidence = format!("{poor} of {} images; {evidence}", images.len());
         let remedy = "white walls, sky and fog give few features: expect the estimate to drift there";
         findings.add(Severity::Warning, Area::Images, title, evidence, remedy);
+        findings.state_interval(poor_images.map(|image| image.stamp_ns));
     } else {
         findings.good(Area::Images, format!("the images of {} have enough texture", camera.key), evidence);
     }
@@ -252,5 +255,7 @@ pub(crate) fn check_video_decoding(log: &FlightLog, survey: &Survey, rig: &Rig, 
         let evidence = format!("{count} of {of} images: {}", stretches.join("; "));
         let remedy = "a run skips them up to the next keyframe: record without losses, or with more frequent keyframes";
         findings.add(Severity::Warning, Area::Images, title, evidence, remedy);
+        let ends = |stretch: &MissingFrames| second(stretch.first + stretch.count - 1);
+        findings.state_times(missing.first().map(|it| second(it.first)), missing.last().map(ends));
     }
 }

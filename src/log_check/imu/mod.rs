@@ -272,6 +272,8 @@ fn check_clipping(samples: &[ImuSample], findings: &mut Findings) {
                 let remedy =
                     "set a wider range in the sensor, or reduce vibration: clipped samples bias the preintegration";
                 findings.add(Severity::Warning, Area::Imu, title, evidence, remedy);
+                let at_limit = samples.iter().zip(components(gyroscope, axis)).filter(|(_, it)| it.abs() >= limit);
+                findings.state_interval(at_limit.map(|(sample, _)| sample.stamp_ns));
             }
         }
     }

@@ -29,6 +29,7 @@ pub(super) fn check_unmeasured(survey: &Survey, findings: &mut Findings) {
         );
         let (title, remedy) = texts(*reason);
         findings.add(Severity::Warning, Area::Imu, title, evidence, remedy);
+        findings.state_interval(stamps_ns.iter().copied());
     }
 }
 

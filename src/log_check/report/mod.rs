@@ -12,8 +12,18 @@ use serde::{Deserialize, Serialize, Serializer};
 use crate::faults::Fault;
 pub use crate::faults::{Area, Severity};
 use crate::frontend::readout::RowTrack;
+use crate::geometry::seconds_from_ns;
 use crate::sensors::ImageMask;
 use crate::text::without_signed_zeros;
+
+/// Time in which a finding holds, in seconds since the log began.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct FindingInterval {
+    /// `None` from the start of the log on.
+    pub since_s: Option<f64>,
+    /// `None` up to the end of the log.
+    pub until_s: Option<f64>,
+}
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Finding {
@@ -25,6 +35,8 @@ pub struct Finding {
     pub evidence: String,
     /// Instruction; empty if nothing needs to be done.
     pub remedy: String,
+    #[serde(flatten)]
+    pub interval: FindingInterval,
     /// True for a value of the rig that is only assumed, without a sign that it is wrong.
     #[serde(skip)]
     pub is_assumption: bool,
@@ -147,20 +159,44 @@ impl Findings {
         remedy: impl Into<String>,
     ) {
         let [title, evidence, remedy] = [title.into(), evidence.into(), remedy.into()].map(without_signed_zeros);
-        self.list.push(Finding { severity, area, title, evidence, remedy, is_assumption: false, faults: Vec::new() });
+        self.push(severity, area, [title, evidence, remedy], false);
+    }
+
+    fn push(&mut self, severity: Severity, area: Area, texts: [String; 3], is_assumption: bool) {
+        let ([title, evidence, remedy], interval) = (texts, FindingInterval::default());
+        let faults = Vec::new();
+        self.list.push(Finding { severity, area, title, evidence, remedy, interval, is_assumption, faults });
+    }
+
+    /// States the time in which the finding that was added last holds, from the first to the last of some stamps in
+    /// nanoseconds since the log began.
+    pub(super) fn state_interval(&mut self, stamps_ns: impl IntoIterator<Item = i64>) {
+        let range = stamps_ns.into_iter().fold(None, |range: Option<(i64, i64)>, stamp_ns| {
+            Some(range.map_or((stamp_ns, stamp_ns), |(first, last)| (first.min(stamp_ns), last.max(stamp_ns))))
+        });
+        if let Some((first_ns, last_ns)) = range {
+            self.state_times(Some(seconds_from_ns(first_ns)), Some(seconds_from_ns(last_ns)));
+        }
+    }
+
+    /// The same from times in seconds; `None` stands for the start and the end of the log.
+    pub(super) fn state_times(&mut self, since_s: Option<f64>, until_s: Option<f64>) {
+        if let Some(last) = self.list.last_mut() {
+            last.interval = FindingInterval { since_s, until_s };
+        }
     }
 
     /// States the fault of the finding that was added last with its value, or the faults one of which it is.
     pub(super) fn state_faults(&mut self, faults: impl IntoIterator<Item = Fault>) {
         if let Some(last) = self.list.last_mut() {
             last.faults.extend(faults);
+            last.interval.since_s = last.interval.since_s.or_else(|| last.since_s());
         }
     }
 
     /// Adds a warning about a value that is only assumed.
     pub(super) fn assumption(&mut self, area: Area, title: String, evidence: String, remedy: String) {
-        let severity = Severity::Warning;
-        self.list.push(Finding { severity, area, title, evidence, remedy, is_assumption: true, faults: Vec::new() });
+        self.push(Severity::Warning, area, [title, evidence, remedy], true);
     }
 
     /// Excludes a measurement, whose fault is reported, from later comparisons.

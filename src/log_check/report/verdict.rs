@@ -160,6 +160,7 @@ impl Display for Verdict {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::log_check::FindingInterval;
 
     fn finding(severity: Severity, area: Area, title: &str) -> Finding {
         Finding {
@@ -168,6 +169,7 @@ mod tests {
             title: title.to_owned(),
             evidence: "3 of 7".to_owned(),
             remedy: format!("mend {title}"),
+            interval: FindingInterval::default(),
             is_assumption: false,
             faults: Vec::new(),
         }

@@ -35,24 +35,27 @@ pub(super) fn check_copies(used: &UsedTopic<'_>, findings: &mut Findings) {
             }
             std::collections::btree_map::Entry::Occupied(entry) => {
                 let sent_twice = checksum.is_some() && entry.get() == checksum;
-                if sent_twice { &mut equal } else { &mut unequal }.push(seconds_from_ns(*stamp_ns));
+                if sent_twice { &mut equal } else { &mut unequal }.push(*stamp_ns);
             }
         }
     }
-    let listed = |repeats: &[f64]| {
-        let (first_s, last_s) = (percentile(repeats, 0.0), percentile(repeats, 1.0));
+    let listed = |repeats_ns: &[i64]| {
+        let repeats: Vec<f64> = repeats_ns.iter().copied().map(seconds_from_ns).collect();
+        let (first_s, last_s) = (percentile(&repeats, 0.0), percentile(&repeats, 1.0));
         format!("{} of {} messages, the first at {first_s:.3} s, the last at {last_s:.3} s", repeats.len(), times.len())
     };
     if !equal.is_empty() {
         let evidence = format!("{} have stamp and content of an earlier one", listed(&equal));
         let remedy = "the driver or a relay sends them twice; the copies are dropped";
         findings.add(Severity::Warning, Area::Time, format!("messages of {role} are sent twice"), evidence, remedy);
+        findings.state_interval(equal);
     }
     if !unequal.is_empty() {
         let evidence = format!("{} have the stamp of another one with other content", listed(&unequal));
         let remedy =
             "the driver stamps a batch once, or there are two publishers; the first message of a stamp is used";
         findings.add(Severity::Warning, Area::Time, format!("stamps of {role} repeat"), evidence, remedy);
+        findings.state_interval(unequal);
     }
     if used.role == "imu0" || used.of_images {
         check_delayed_copies(role, used.topic, findings);
@@ -150,4 +153,5 @@ fn check_images_of(camera: &CameraRig, topic: &TopicSurvey, rotating_ns: &[i64],
         (title, "the camera or its driver stalls, or fills gaps: send each image once; a run skips the copies")
     };
     findings.add(Severity::Warning, Area::Images, title, evidence, remedy);
+    findings.state_interval(copies.iter().map(|index| times[*index].stamp_ns));
 }

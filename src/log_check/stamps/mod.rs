@@ -118,6 +118,7 @@ fn check_order(used: &UsedTopic<'_>, findings: &mut Findings) {
         (Severity::Warning, title, "record them in the order of their stamps; nothing is missing: a run sorts them")
     };
     findings.add(severity, Area::Time, title, evidence, remedy);
+    findings.state_interval(backwards.iter().map(|index| stamps_ns[*index]));
 }
 
 /// Reports steps between stamps in which messages are missing.
@@ -142,6 +143,8 @@ fn check_gaps(role: &str, spacing: &Spacing, of_images: bool, findings: &mut Fin
     };
     let remedy = "record with less load or a larger buffer; over a gap the IMU is interpolated and features are lost";
     findings.add(severity, Area::Time, format!("{role} has gaps"), evidence, remedy);
+    let ends = |index: &usize| spacing.start_s(*index) + steps[*index];
+    findings.state_times(gaps.first().map(|first| spacing.start_s(*first)), gaps.last().map(ends));
 }
 
 /// Reports stamps that are taken on arrival: batches, or steps that scatter.

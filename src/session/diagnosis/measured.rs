@@ -128,13 +128,14 @@ mod tests {
     use std::sync::atomic::AtomicBool;
 
     use super::*;
-    use crate::log_check::Area;
+    use crate::log_check::{Area, FindingInterval};
     use crate::session::plan::RunSpec;
     use crate::simulation::{SyntheticOptions, synthetic_tracks};
 
     fn finding(severity: Severity, faults: &[Fault]) -> Finding {
         let (title, evidence, remedy) = Default::default();
-        Finding { severity, area: Area::Time, title, evidence, remedy, is_assumption: false, faults: faults.to_vec() }
+        let (area, interval, faults) = (Area::Time, FindingInterval::default(), faults.to_vec());
+        Finding { severity, area, title, evidence, remedy, interval, is_assumption: false, faults }
     }
 
     /// Texts of the changes that undo faults in a run, and whether an error cannot be undone.

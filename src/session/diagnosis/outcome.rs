@@ -218,6 +218,7 @@ fn described(value: &AgreementValue) -> String {
 mod tests {
     use super::*;
     use crate::faults::{Area, Fault};
+    use crate::log_check::FindingInterval;
 
     #[test]
     fn an_error_of_the_log_precedes_what_the_trials_say() {
@@ -227,6 +228,7 @@ mod tests {
             title: "the heading of /vehicle/attitude steps by +20.1° at 4.00 s".to_owned(),
             evidence: String::new(),
             remedy: "take an attitude whose heading does not step".to_owned(),
+            interval: FindingInterval::default(),
             is_assumption: false,
             faults: Vec::new(),
         };

@@ -2,7 +2,7 @@
 
 use crate::estimator::EventKind;
 use crate::faults::{Area, Fault, FaultKind, Severity};
-use crate::log_check::{Finding, Trust};
+use crate::log_check::{Finding, FindingInterval, Trust};
 use crate::session::record::RunRecord;
 use crate::session::result::{Answer, FindingSource};
 use crate::session::tests::memory::{estimated, recorded};
@@ -19,7 +19,16 @@ fn answer(flight: &SyntheticFlight, check: &[Finding], run: &RunRecord) -> Answe
 fn finding(severity: Severity, title: &str, faults: Vec<Fault>) -> Finding {
     let area = faults.first().map_or(Area::Images, |fault| fault.kind.row().area);
     let [evidence, remedy] = ["3 of 7", "mend it"].map(str::to_owned);
-    Finding { severity, area, title: title.to_owned(), evidence, remedy, is_assumption: false, faults }
+    Finding {
+        severity,
+        area,
+        title: title.to_owned(),
+        evidence,
+        remedy,
+        interval: FindingInterval::default(),
+        is_assumption: false,
+        faults,
+    }
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use crate::faults::{Area, Fault, FaultKind, Severity, correct_joint_angles};
-use crate::log_check::Finding;
+use crate::log_check::{Finding, FindingInterval};
 use crate::sensors::Rig;
 use crate::session::diagnosis::{Diagnosis, DiagnosisVerdict, diagnose_run};
 use crate::session::engine::{History, OwnedStepInput, RunEngine, estimator_config};
@@ -52,6 +52,7 @@ fn error_of(fault: &Fault) -> Finding {
         title: format!("{fault:?}"),
         evidence: String::new(),
         remedy: String::new(),
+        interval: FindingInterval::default(),
         is_assumption: false,
         faults: vec![fault.clone()],
     }

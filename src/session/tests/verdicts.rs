@@ -2,7 +2,7 @@
 
 use crate::faults::{Area, Severity};
 use crate::gimbal::ParameterId;
-use crate::log_check::Finding;
+use crate::log_check::{Finding, FindingInterval};
 use crate::observability::Determination;
 use crate::session::record::{FlightParameter, FlightVerdicts, RunRecord};
 use crate::session::result::Answer;
@@ -88,6 +88,7 @@ fn verdicts_of_a_run_that_is_not_trusted_are_withheld() {
         title: "the accelerometer is saturated".to_owned(),
         evidence: String::new(),
         remedy: "mount it softly".to_owned(),
+        interval: FindingInterval::default(),
         is_assumption: false,
         faults: Vec::new(),
     };
@@ -132,6 +133,7 @@ fn a_cause_comes_before_residuals_that_are_worse() {
         title: "imu0 is stamped on arrival".to_owned(),
         evidence: String::new(),
         remedy: String::new(),
+        interval: FindingInterval::default(),
         is_assumption: false,
         faults: Vec::new(),
     };

@@ -100,7 +100,7 @@ mod tests {
     use crate::faults::{Area, FaultKind, Severity};
     use crate::gui::Dialog;
     use crate::gui::window::tests::{SECOND_NS, bench, commands_of};
-    use crate::log_check::Finding;
+    use crate::log_check::{Finding, FindingInterval};
     use crate::session::{Command, Diagnosis, DiagnosisProgress, DiagnosisVerdict, ForkChanges, RankedCause};
 
     fn diagnosis() -> Diagnosis {
@@ -128,6 +128,7 @@ mod tests {
                 title: "the stamps of the joint angles are 81.0 ms later than the rig says".to_owned(),
                 evidence: String::new(),
                 remedy: "set gimbal.timeshift_gimbal_imu: -0.0810 in the rig, or run with timeshift=on".to_owned(),
+                interval: FindingInterval::default(),
                 is_assumption: false,
                 faults: Vec::new(),
             }],
