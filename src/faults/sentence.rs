@@ -46,8 +46,17 @@ pub struct Subject<'a> {
 impl Subject<'_> {
     /// The fault in words; its values have the order of its kind.
     pub fn sentence(&self, fault: &Fault) -> Sentence {
+        Self::timed(fault, self.texts(fault))
+    }
+
+    /// The same of a fault whose value lies beyond the values that were searched.
+    pub fn sentence_beyond_search(&self, fault: &Fault) -> Sentence {
+        Self::timed(fault, self.texts_beyond_search(fault))
+    }
+
+    /// Texts of a fault with its time.
+    fn timed(fault: &Fault, (statement, remedy): (String, String)) -> Sentence {
         let severity = if fault.is_useless() { Severity::Error } else { Severity::Warning };
-        let (statement, remedy) = self.texts(fault);
         let Some(since_s) = fault.since_s else { return Sentence { severity, statement, remedy } };
         let when = match fault.kind {
             FaultKind::JointOffset => format!("at about {since_s:.1} s"),
@@ -116,6 +125,42 @@ impl Subject<'_> {
             ),
             FaultKind::UnusableImu => texts("the IMU's samples cannot be restored", "record the IMU's raw samples"),
             FaultKind::UnusableJoints => texts("the joint angles cannot be restored", "record the encoders' readings"),
+        }
+    }
+
+    /// Statement and remedy without time and value.
+    fn texts_beyond_search(&self, fault: &Fault) -> (String, String) {
+        let (camera, first) = (self.camera_key, fault.value(0));
+        let beyond_range = |statement: String, remedy: String| texts(format!("{statement} {BEYOND_SEARCH}"), remedy);
+        let later = |stamps: &str| {
+            let side = if first > 0.0 { "earlier" } else { "later" };
+            beyond_range(
+                format!("the stamps of {stamps} are {side} than the rig says, by a time"),
+                "run with timeshift=on".to_owned(),
+            )
+        };
+        match fault.kind {
+            FaultKind::Focal => {
+                let error = if first < 1.0 { "long" } else { "short" };
+                beyond_range(
+                    format!("the focal length of {camera} in the rig is too {error}, by a factor"),
+                    format!("calibrate {camera} at this size, crop and zoom of its images"),
+                )
+            }
+            FaultKind::Zoom => {
+                beyond_range(format!("the focal length of {camera} changes by a factor"), FIX_ZOOM.to_owned())
+            }
+            FaultKind::CameraClock => later(camera),
+            FaultKind::EncoderClock => later("the joint angles"),
+            FaultKind::ImuNoise => beyond_range(
+                "the IMU is noisier than its noise densities in the rig, by a factor".to_owned(),
+                "measure the densities: dcvins noise".to_owned(),
+            ),
+            FaultKind::EncoderNoise => beyond_range(
+                "the joint angles are noisier than gimbal.encoder_sigma, by a factor".to_owned(),
+                "check what makes the readings wrong".to_owned(),
+            ),
+            _ => self.texts(fault),
         }
     }
 
@@ -246,6 +291,8 @@ impl Subject<'_> {
     }
 }
 
+/// Words after a quantity of which the search has found no value.
+const BEYOND_SEARCH: &str = "beyond the searched range";
 /// Remedy of a focal length that changes.
 const FIX_ZOOM: &str =
     "switch off zoom and digital stabilization, or use the part of the log with the calibrated focal length";

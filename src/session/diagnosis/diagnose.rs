@@ -278,7 +278,7 @@ impl Search<'_, '_> {
         let hypothesis = &candidate.hypothesis;
         let step = hypothesis.from.unwrap_or(if span.is_start { 0 } else { span.steps.start });
         let from_s = hypothesis.from.map(|step| self.stamp_s(step));
-        let (statement, remedy) = texts(self.run, hypothesis, &candidate.result, from_s);
+        let (statement, remedy) = texts(self.run, candidate, from_s);
         let values: Vec<AgreementValue> = agreement::values(&candidate.misfit);
         RankedCause {
             cause: hypothesis.cause,
@@ -288,6 +288,7 @@ impl Search<'_, '_> {
             from_ns: self.run.inputs.get(step).map_or(0, |input| input.stamp_ns),
             from_s: self.stamp_s(step),
             parameters: hypothesis.parameters,
+            beyond_search: candidate.beyond_search,
             gain: given - candidate.score,
             values,
             accuracy,

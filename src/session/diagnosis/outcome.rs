@@ -47,6 +47,8 @@ pub struct RankedCause {
     pub from_s: f64,
     /// Number of values that the cause takes from the recording.
     pub parameters: usize,
+    /// True if the search has found no value of the cause: the value of `changes` is the best one of a coarse search.
+    pub beyond_search: bool,
     /// Decrease of −2·ln of the likelihood against the run without a change, less the penalty of the parameters.
     pub gain: f64,
     /// Values of the run with the change, over the scored steps.

@@ -19,6 +19,8 @@ pub(super) struct RankedTrial {
     pub(super) misfit: Misfit,
     /// Score of the trial; the lowest one is the best.
     pub(super) score: f64,
+    /// True if the search has found no value of the cause.
+    pub(super) beyond_search: bool,
 }
 
 impl Explanation for RankedTrial {
@@ -56,9 +58,43 @@ pub(super) fn score(hypothesis: &TrialHypothesis, misfit: &Misfit, given: &Misfi
     criterion(cost + 2.0 * scale.windows * noise, hypothesis.parameters as f64, observations)
 }
 
-/// The best candidate of each cause, the best cause first; a special case that is about as good precedes the general
-/// cause.
+impl RankedTrial {
+    /// Value that the search varies; `None` for a cause without one.
+    fn searched_value(&self) -> Option<f64> {
+        let changes = &self.hypothesis.changes;
+        match self.hypothesis.cause {
+            FaultKind::ImuNoise => Some(changes.imu_noise),
+            FaultKind::EncoderNoise => Some(changes.encoder_noise),
+            FaultKind::Focal | FaultKind::Zoom | FaultKind::CameraClock | FaultKind::EncoderClock => {
+                changes.corrections.first().map(|fault| fault.value(0))
+            }
+            _ => None,
+        }
+    }
+
+    /// True if the search has found no value of the cause: its best value is one of the coarse ones, no refined one lies
+    /// between the neighbours of this value, and it is the smallest or the largest, or a focal length of the whole run, which
+    /// the columns of the intrinsics refine wherever they can.
+    pub(super) fn is_beyond_search(&self, all: &[Self]) -> bool {
+        let Some(value) = self.searched_value() else { return false };
+        let (cause, coarse) = (self.hypothesis.cause, self.hypothesis.cause.row().trials);
+        let below = coarse.iter().copied().filter(|other| *other < value).max_by(f64::total_cmp);
+        let above = coarse.iter().copied().filter(|other| *other > value).min_by(f64::total_cmp);
+        let is_near = |other: f64| below.is_none_or(|below| other > below) && above.is_none_or(|above| other < above);
+        let of_cause = all.iter().filter(|it| it.hypothesis.cause == cause).filter_map(Self::searched_value);
+        let is_refined = |other: f64| !coarse.contains(&other) && is_near(other);
+        let is_edge =
+            below.is_none() || above.is_none() || (cause == FaultKind::Focal && self.hypothesis.from.is_none());
+        coarse.contains(&value) && is_edge && !of_cause.into_iter().any(is_refined)
+    }
+}
+
+/// The best candidate of each cause, the best cause first; a special case that is about as good precedes the general cause
+/// if it has a value, else it follows.
 pub(super) fn by_cause(given: &RankedTrial, mut candidates: Vec<RankedTrial>) -> Vec<RankedTrial> {
+    for place in 0..candidates.len() {
+        candidates[place].beyond_search = candidates[place].is_beyond_search(&candidates);
+    }
     let is_slight = |it: &RankedTrial| {
         it.hypothesis.cause == FaultKind::ImageRegion && given.score - it.score < REGION_RATIO * given.score
     };
@@ -71,8 +107,14 @@ pub(super) fn by_cause(given: &RankedTrial, mut candidates: Vec<RankedTrial>) ->
         }
     }
     if let Some(best) = kept.first() {
-        let preferred = RankedTrial::preferred(&kept, margin(given.score - best.score), |_| true);
+        let preferred = RankedTrial::preferred(&kept, margin(given.score - best.score), |it| !it.beyond_search);
         kept[..=preferred].rotate_right(1);
+    }
+    if let Some(first) = kept.first().filter(|first| first.beyond_search) {
+        let limit = first.score + margin(given.score - first.score);
+        let has_value = |it: &RankedTrial| !it.beyond_search && !first.contains(it) && it.contains(first);
+        let general = kept.iter().position(|it| has_value(it) && it.score < limit).unwrap_or(0);
+        kept[..=general].rotate_right(1);
     }
     kept
 }
@@ -93,7 +135,9 @@ pub(super) fn decide(given: &RankedTrial, ranked: &[RankedTrial]) -> (DiagnosisV
     }
     // A cause that leaves a disagreement does not compete with one that leaves none.
     let as_good = |it: &&RankedTrial| after > 1.0 || disagreement(&it.misfit) <= 1.0;
-    match best.rivals(ranked, margin(gain)).filter(as_good).count() {
+    // The general cause has estimated the value that its special case lacks.
+    let has_value = |it: &&RankedTrial| !it.beyond_search || !best.contains(it);
+    match best.rivals(ranked, margin(gain)).filter(as_good).filter(has_value).count() {
         0 => (DiagnosisVerdict::Cause, 1),
         rivals => (DiagnosisVerdict::Several, (rivals + 1).min(MOST_REMAINING)),
     }
@@ -128,7 +172,7 @@ mod tests {
         let hypothesis = TrialHypothesis::change(cause, changes, 1);
         let misfit = misfit(length_px);
         let score = score(&hypothesis, &misfit, given, &SCALE);
-        RankedTrial { hypothesis, result: TrialResult::default(), misfit, score }
+        RankedTrial { hypothesis, result: TrialResult::default(), misfit, score, beyond_search: false }
     }
 
     fn decision(given_px: f64, causes: &[(FaultKind, f64)]) -> ((DiagnosisVerdict, usize), Vec<FaultKind>) {
@@ -151,6 +195,30 @@ mod tests {
         let (found, order) = decision(1.5, &[(FaultKind::Intrinsics, 0.1), (focal, 0.1)]);
         assert_eq!((found, order), ((DiagnosisVerdict::Cause, 1), vec![focal, FaultKind::Intrinsics]));
         assert_eq!(decision(1.5, &[]).0, (DiagnosisVerdict::Unexplained, 0));
+    }
+
+    #[test]
+    fn a_coarse_value_without_refined_ones_beside_it_is_no_value() {
+        let given = misfit(1.5);
+        let focal = |factor: f64, length_px: f64| {
+            let corrections = vec![Fault::new(FaultKind::Focal, &[factor])];
+            candidate(FaultKind::Focal, ForkChanges { corrections, ..ForkChanges::default() }, length_px, &given)
+        };
+        let lens = candidate(FaultKind::Intrinsics, ForkChanges::default(), 0.1, &given);
+        let of_run = candidate(FaultKind::Focal, ForkChanges::default(), 1.5, &given);
+        let found = |trials: Vec<RankedTrial>| {
+            let ranked = by_cause(&of_run, trials);
+            let named = ranked.iter().map(|it| (it.hypothesis.cause, it.beyond_search)).collect::<Vec<_>>();
+            (decide(&of_run, &ranked), named)
+        };
+        let (refined, one) = (focal(0.74, 0.1), (DiagnosisVerdict::Cause, 1));
+        let expected = (one, vec![(FaultKind::Focal, false)]);
+        assert_eq!(found(vec![focal(0.7, 0.11), refined]), expected);
+        assert_eq!(found(vec![focal(0.7, 0.1), focal(0.74, 0.11)]), expected);
+        // The estimate goes elsewhere: the general cause, which has a value, is named.
+        let all = vec![focal(0.7, 0.1), focal(1.03, 1.4), lens];
+        assert_eq!(found(all), (one, vec![(FaultKind::Intrinsics, false), (FaultKind::Focal, true)]));
+        assert_eq!(found(vec![focal(1.8, 0.1)]), (one, vec![(FaultKind::Focal, true)]));
     }
 
     #[test]

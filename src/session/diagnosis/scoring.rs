@@ -37,7 +37,7 @@ pub(super) fn scored(given: TrialResult, done: Vec<(TrialHypothesis, TrialResult
     let scale = Scale::of(&reference, sigma_px, end_ns - from_ns);
     let candidate = |hypothesis: TrialHypothesis, result: TrialResult, misfit: Misfit| {
         let score = score(&hypothesis, &misfit, &given_misfit, &scale);
-        RankedTrial { hypothesis, result, misfit, score }
+        RankedTrial { hypothesis, result, misfit, score, beyond_search: false }
     };
     let unchanged = TrialHypothesis::change(FaultKind::Chain, ForkChanges::default(), 0);
     let others = done.into_iter().zip(misfits).map(|((it, result), misfit)| candidate(it, result, misfit)).collect();

@@ -1,6 +1,7 @@
 //! Causes in words, with the values that their trials estimate.
 
 use super::hypotheses::TrialHypothesis;
+use super::ranking::RankedTrial;
 use super::refinement::estimated_lens;
 use super::trial::{DiagnosedRun, TrialResult};
 use crate::calibration::transform_distance;
@@ -9,15 +10,11 @@ use crate::faults::{Fault, FaultKind, Subject};
 use crate::gimbal::{ParameterId, ParameterPart, Quantity};
 
 /// Statement and remedy of a cause; `from_s` is the stamp from which on its change acts, `None` for the whole run.
-pub(super) fn texts(
-    run: &DiagnosedRun<'_>,
-    hypothesis: &TrialHypothesis,
-    result: &TrialResult,
-    from_s: Option<f64>,
-) -> (String, String) {
+pub(super) fn texts(run: &DiagnosedRun<'_>, trial: &RankedTrial, from_s: Option<f64>) -> (String, String) {
     let subject = Subject { rig: run.rig, camera_key: run.camera_key };
-    let faults = faults(run, hypothesis, result).into_iter();
-    let sentences = faults.map(|fault| subject.sentence(&Fault { since_s: from_s, ..fault }));
+    let faults = faults(run, &trial.hypothesis, &trial.result).into_iter();
+    let in_words = if trial.beyond_search { Subject::sentence_beyond_search } else { Subject::sentence };
+    let sentences = faults.map(|fault| in_words(&subject, &Fault { since_s: from_s, ..fault }));
     let (statements, remedies): (Vec<String>, Vec<String>) =
         sentences.map(|sentence| (sentence.statement, sentence.remedy)).unzip();
     (statements.join(", and "), remedies.join("; "))

@@ -113,6 +113,7 @@ mod tests {
             from_ns: 2 * SECOND_NS,
             from_s: 2.0,
             parameters: 1,
+            beyond_search: false,
             gain: 8000.0,
             values: Vec::new(),
             accuracy: None,
