@@ -10,6 +10,7 @@ pub mod desktop;
 mod determination;
 mod events;
 pub mod figures;
+mod findings;
 mod help;
 pub mod image_panel;
 pub mod inspector;

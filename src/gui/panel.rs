@@ -58,6 +58,8 @@ pub struct Selection {
     pub(crate) flight: FlightTables,
     /// Trust, cause and required accuracy of the runs.
     pub(crate) answers: Answers,
+    /// Panel that the window shows from the next frame on.
+    pub(crate) wanted_panel: Option<PanelName>,
 }
 
 #[derive(Clone, Debug, PartialEq)]

@@ -15,7 +15,8 @@ type LaneRow<'a> = (i64, &'a str, Option<&'a StepRecord>, Option<EventCells<'a>>
 type LaneColumn<'a> = Column<'a, LaneRow<'a>>;
 
 impl CsvTable for TimelinePanel {
-    /// A row for every step of every run, followed by one for each of its notable events and of the log's warnings.
+    /// A row for every step of every run, followed by one for each of its notable events and findings and of the log's
+    /// warnings.
     fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {
         let rank = |step: Option<&StepRecord>, of: fn(&RankReport) -> usize| {
             step?.rank.as_ref().filter(|rank| !rank.parameters.is_empty()).map(of)
@@ -39,7 +40,12 @@ impl CsvTable for TimelinePanel {
         let warning = |message| Some(("warning", None, None, message));
         let mut rows: Vec<LaneRow<'_>> =
             warnings.map(|it| (it.stamp_ns, "", None, warning(it.message.as_str()))).collect();
-        for run in &ctx.recording.runs {
+        let answers: Vec<_> = ctx.recording.runs.iter().map(|run| ctx.answer(run)).collect();
+        for (run, answer) in ctx.recording.runs.iter().zip(&answers) {
+            for finding in &answer.findings {
+                let stamp_ns = finding.since_ns.unwrap_or(ctx.recording.start_ns);
+                rows.push((stamp_ns, &run.spec.label, None, Some(("finding", None, None, &finding.statement))));
+            }
             let label = run.spec.label.as_str();
             for step in &run.steps {
                 rows.push((step.report.stamp_ns, label, Some(step), None));

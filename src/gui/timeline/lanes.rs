@@ -31,6 +31,8 @@ pub(super) fn scale_width(height: f32) -> f32 {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Lane {
+    /// Findings about the selected run.
+    Findings,
     /// Phases and keyframes of a run.
     Run(usize),
     /// Time range of a trajectory of another program.
@@ -52,6 +54,7 @@ pub(crate) enum Lane {
 impl Lane {
     pub(crate) fn name(self, ctx: &PanelContext<'_>) -> String {
         match self {
+            Self::Findings => "findings".to_owned(),
             Self::Run(run) => ctx.recording.runs.get(run).map_or_else(String::new, |run| run.spec.label.clone()),
             Self::Trajectory(number) => {
                 ctx.recording.trajectories.get(number).map_or_else(String::new, |lane| lane.label.clone())
@@ -70,6 +73,10 @@ impl Lane {
     /// Tooltip of the lane: content, unit and file column.
     pub(super) const fn meaning(self) -> &'static str {
         match self {
+            Self::Findings => {
+                "Reasons to doubt the selected run, the one with the largest effect first; red: not usable; click: move the \
+                 cursor to the start and show what it is about"
+            }
             Self::Run(_) => "Phases of the run: hatched while initializing, filled while tracking; ticks: keyframes",
             Self::Trajectory(_) => {
                 "Time with poses of a trajectory of another program; it has poses only, so that the lanes of rank, features \
@@ -102,7 +109,8 @@ impl Lane {
             Self::Rank => Some(INFORMED),
             Self::Features => Some(FEATURES),
             Self::Reprojection => Some(RMS),
-            Self::Run(_)
+            Self::Findings
+            | Self::Run(_)
             | Self::Trajectory(_)
             | Self::Breakpoints
             | Self::Events

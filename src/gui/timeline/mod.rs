@@ -2,6 +2,7 @@
 
 mod csv;
 mod determinations;
+mod findings_lane;
 mod lanes;
 mod markers;
 mod model;
@@ -15,6 +16,7 @@ pub(crate) use transport::{SPEEDS, next_speed, toggled_loop};
 
 use egui::{Align2, PointerButton, Rect, Response, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
 
+use self::findings_lane::FindingsLane;
 use self::lanes::Lane;
 use self::model::RunLanes;
 use self::parameters_lane::{ParametersLane, history};
@@ -49,6 +51,7 @@ pub struct TimelinePanel {
     /// Start of a range that is being selected with Shift.
     range_begin_ns: Option<i64>,
     parameters: ParametersLane,
+    findings: FindingsLane,
 }
 
 impl Panel for TimelinePanel {
@@ -59,9 +62,12 @@ impl Panel for TimelinePanel {
         }
         transport::ui(ui, ctx, self.pace.reading());
         let rect = ui.available_rect_before_wrap();
+        self.findings.read(ctx);
         let shown = self.shown_lanes(ctx);
         let open = self.parameters.open;
-        let room = (rect.height() - RULER_HEIGHT) / shown.len() as f32;
+        let findings_height = self.findings.height();
+        let others = shown.iter().filter(|lane| **lane != Lane::Findings).count();
+        let room = (rect.height() - RULER_HEIGHT - findings_height) / others as f32;
         let height = if open { LANE_HEIGHT } else { room.clamp(MIN_LANE_HEIGHT, MAX_LANE_HEIGHT) };
         let scale = lanes::scale_width(height - 2.0);
         let left = (rect.left() + self.label_width(ui, ctx) + scale).min(rect.center().x);
@@ -79,10 +85,17 @@ impl Panel for TimelinePanel {
 
         let mut read = Vec::new();
         self.parameters.rows_rect = None;
-        for (place, lane) in shown.iter().enumerate() {
-            let top = plot.top() + RULER_HEIGHT + place as f32 * height;
+        let first_top = plot.top() + RULER_HEIGHT + findings_height;
+        let mut next_top = plot.top() + RULER_HEIGHT;
+        for lane in &shown {
+            let top = next_top;
             // The open rows are last and fill the room.
-            let bottom = if open && *lane == Lane::Parameters { rect.bottom() } else { top + height };
+            let bottom = match lane {
+                Lane::Findings => top + findings_height,
+                Lane::Parameters if open => rect.bottom(),
+                _ => top + height,
+            };
+            next_top = bottom;
             if bottom > rect.bottom() + 1.0 || bottom < top + 3.0 {
                 break;
             }
@@ -91,7 +104,7 @@ impl Panel for TimelinePanel {
             let axis = self.lane(ui, ctx, *lane, PlotArea { rect: lane_rect, ..area }, label_rect);
             read.extend(axis.map(|area| (*lane, area)));
         }
-        let lane_y = |run: usize| plot.top() + RULER_HEIGHT + (run as f32 + 0.5) * height - 1.0;
+        let lane_y = |run: usize| first_top + (run as f32 + 0.5) * height - 1.0;
         paint_forks(&painter, ctx, &area, lane_y);
         paint_range(&painter, ctx, &area);
         markers::paint(&painter, &theme, &area, &ctx.playback.markers);
@@ -110,14 +123,17 @@ impl Panel for TimelinePanel {
         let id = ui.unique_id().with("timeline");
         let value = value_text(ctx);
         let origin = ui.input(|input| input.pointer.press_origin());
-        let on_rows = self.parameters.rows_rect.filter(|rows| origin.is_some_and(|origin| rows.contains(origin)));
-        let (clicks, wheel) = (if on_rows.is_some() { Clicks::Brush } else { Clicks::Scrub }, Wheel::Zooms);
+        let is_pressed = |rect: &Rect| origin.is_some_and(|origin| rect.contains(origin));
+        let on_rows = self.parameters.rows_rect.filter(is_pressed);
+        let is_apart = on_rows.or(self.findings.rect.filter(is_pressed)).is_some();
+        let (clicks, wheel) = (if is_apart { Clicks::Brush } else { Clicks::Scrub }, Wheel::Zooms);
         let response = navigate(ui, ctx, &area, &Interaction { id, name: "Timeline", value: &value, clicks, wheel });
         step_by_assistance(ui, ctx, &response);
         self.select_range(ui, ctx, &area, &response);
         if on_rows.is_some() {
             self.parameters.brush(ui, ctx, &area, &response);
         }
+        self.findings.clicks_ui(ui, ctx, &area);
         self.parameters.stretch_ui(ui, ctx, &area);
         self.hover(ui, ctx, &area, response);
     }
@@ -134,7 +150,7 @@ impl TimelinePanel {
         } else {
             LANE_HEIGHT * 8.0
         };
-        transport::HEIGHT + RULER_HEIGHT + LANE_HEIGHT * lanes as f32 + below + 10.0
+        transport::HEIGHT + RULER_HEIGHT + self.findings.height() + LANE_HEIGHT * lanes as f32 + below + 10.0
     }
 
     /// True if the rows of the parameters are open.
@@ -146,8 +162,10 @@ impl TimelinePanel {
         let breaks = !ctx.playback.breakpoints.list().is_empty();
         let values = [Lane::Rank, Lane::Features, Lane::Reprojection, Lane::Outliers, Lane::Warnings];
         let values = values.into_iter().filter(|_| !self.parameters.open);
-        (0..self.runs.len())
-            .map(Lane::Run)
+        let findings = (self.findings.count() > 0).then_some(Lane::Findings);
+        findings
+            .into_iter()
+            .chain((0..self.runs.len()).map(Lane::Run))
             .chain((0..ctx.recording.trajectories.len()).map(Lane::Trajectory))
             .chain(breaks.then_some(Lane::Breakpoints))
             .chain([Lane::Events])
@@ -198,6 +216,7 @@ impl TimelinePanel {
                     lanes::trajectory(&inner, &area, &lane.track, theme.trajectory(number));
                 }
             }
+            Lane::Findings => self.findings.paint(&inner, &theme, &area),
             Lane::Breakpoints => lanes::breakpoints(&inner, &theme, &area, ctx),
             Lane::Events => lanes::events(&inner, &theme, &area, &self.runs),
             Lane::Rank | Lane::Features | Lane::Reprojection => {
@@ -217,7 +236,10 @@ impl TimelinePanel {
             }
         }
         let selected = ctx.run_number();
-        let value = self.runs.get(selected).and_then(|run| lane.value(run, ctx.cursor_ns));
+        let value = match lane {
+            Lane::Findings => Some(self.findings.count().to_string()),
+            _ => self.runs.get(selected).and_then(|run| lane.value(run, ctx.cursor_ns)),
+        };
         let color = match lane {
             Lane::Run(run) => theme.run(run).color,
             Lane::Trajectory(number) => theme.trajectory(number).color,

@@ -4,7 +4,7 @@ use egui::{Align, Button, Label, Layout as UiLayout, RichText, Ui};
 
 use super::actions::Action;
 use crate::gui::theme::{MAX_RUNS, Theme};
-use crate::gui::{Dialog, PanelContext};
+use crate::gui::{Dialog, PanelContext, findings};
 use crate::log_check::Trust;
 use crate::session::{Answer, Command, FindingSource, Recording, RunRecord};
 
@@ -67,10 +67,8 @@ fn buttons_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, answer: &Answer, actions:
             ctx.commands.push(Command::Fork { run: ctx.run_number(), changes, label: None });
         }
     }
-    if let Some(stamp_ns) = first.since_ns
-        && ui.button("Show").on_hover_text("Move the cursor to the time from which on it holds").clicked()
-    {
-        ctx.commands.push(Command::Seek { stamp_ns });
+    if ui.button("Show").on_hover_text("Move the cursor to its start and show what it is about").clicked() {
+        findings::show(ctx, first);
     }
 }
 

@@ -104,6 +104,9 @@ pub fn window_ui(ui: &mut Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>
         .frame(bar)
         .show(ui, |ui| answer_bar::ui(ui, ctx, &mut actions));
     notices::banner_ui(ui, ctx);
+    if let Some(panel) = ctx.selection.wanted_panel.take() {
+        state.tiles.show(panel);
+    }
 
     // The panels are drawn before the timeline below them, because the Tab key follows the order of drawing.
     let open = state.panels.timeline.has_open_parameters();

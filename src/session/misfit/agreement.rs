@@ -97,6 +97,14 @@ pub(in crate::session) fn onset(steps: &[StepMisfit]) -> Option<usize> {
     (agreed >= STEPS_BEFORE).then(|| (place..place + ONSET_STEPS).find(disagrees).unwrap_or(place))
 }
 
+/// Index of the step from which on the residuals agree with their noise again; `None` if they disagree up to the end.
+pub(in crate::session) fn end(steps: &[StepMisfit]) -> Option<usize> {
+    let means = means(steps);
+    let after = means.iter().rposition(|mean| mean.is_some_and(|mean| mean > 1.0))? + 1;
+    let agreeing = means[after..].iter().filter(|mean| mean.is_some()).count();
+    (agreeing >= LASTING_STEPS).then_some((after + ONSET_STEPS).min(steps.len() - 1))
+}
+
 /// Disagreement of some consecutive steps from each step on; `None` where a step has no window.
 fn means(steps: &[StepMisfit]) -> Vec<Option<f64>> {
     let mean = |some: &[StepMisfit]| some.iter().all(|step| step.tracking).then(|| disagreement(&Misfit::of_all(some)));
@@ -148,5 +156,8 @@ mod tests {
         assert_eq!(onset(&always), None);
         let later = onset(&steps(|number| if number < 120 { 0.9 } else { 30.0 })).unwrap();
         assert!((120..124).contains(&later), "{later}");
+        assert_eq!((end(&always), end(&sound)), (None, None));
+        let again = end(&steps(|number| if (80..120).contains(&number) { 30.0 } else { 0.9 })).unwrap();
+        assert!((119..135).contains(&again), "{again}");
     }
 }

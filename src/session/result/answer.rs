@@ -50,6 +50,9 @@ pub struct RunFinding {
     /// Stamp from which on it holds, in nanoseconds since the log began (in files seconds); `None` for the whole run.
     #[serde(rename = "since_s", serialize_with = "optional_seconds")]
     pub since_ns: Option<i64>,
+    /// Stamp up to which it holds, as `since_ns`; `None` for the end of the run.
+    #[serde(rename = "until_s", serialize_with = "optional_seconds")]
+    pub until_ns: Option<i64>,
     /// Finding of the check with the faults of measurements or rig.
     #[serde(skip)]
     pub checked: Option<Finding>,
@@ -69,6 +72,22 @@ impl RunFinding {
         let of_measurements =
             |finding: &Finding| !matches!(finding.area, Area::Images | Area::Motion) && !is_about_ground_truth(finding);
         self.checked.as_ref().is_some_and(of_measurements)
+    }
+
+    /// Time from which on all later results are affected, in seconds since the log began; `None` for the whole run, and for a
+    /// finding of the check about single messages.
+    fn onset_s(&self) -> Option<f64> {
+        self.checked.as_ref().map_or_else(|| self.since_ns.map(seconds_from_ns), Finding::since_s)
+    }
+
+    /// Subject of the check that found it; `None` for a finding of the run itself.
+    pub fn area(&self) -> Option<Area> {
+        self.checked.as_ref().map(|finding| finding.area)
+    }
+
+    /// Fault of measurements or rig; `None` if none is known.
+    pub fn fault(&self) -> Option<&Fault> {
+        self.checked.as_ref()?.faults.first()
     }
 
     /// Changes of a fork that undo the fault, and the stamp of its first step in nanoseconds since the log began; `None` if
@@ -138,7 +157,7 @@ impl Answer {
         let trust = findings.iter().map(|finding| finding.trust).max().unwrap_or_default();
         let requirement = requirement(rig, run);
         let sentence = match (findings.first(), &requirement) {
-            (Some(first), _) => trust.sentence(first.since_ns.map(seconds_from_ns), &statement(&findings)),
+            (Some(first), _) => trust.sentence(first.onset_s(), &statement(&findings)),
             (None, Some(requirement)) => requirement.sentence(),
             (None, None) => fixed_sentence(run),
         };
@@ -176,7 +195,8 @@ fn check_findings<'a>(rig: &'a Rig, check: &'a [Finding], run: &'a RunRecord) ->
             statement: finding.title.clone(),
             evidence: finding.evidence.clone(),
             remedy: finding.remedy.clone(),
-            since_ns: finding.since_s().map(ns_from_seconds),
+            since_ns: finding.interval.since_s.or(finding.since_s()).map(ns_from_seconds),
+            until_ns: finding.interval.until_s.map(ns_from_seconds),
             checked: Some(finding.clone()),
         })
     })
@@ -242,21 +262,24 @@ fn missing_joint_angles(rig: &Rig, run: &RunRecord) -> Option<RunFinding> {
         evidence: format!("0 of {estimated} estimated frames have joint angles; they are free unknowns"),
         remedy: "record the joint angles, or name their topic in the rig".to_owned(),
         since_ns: None,
+        until_ns: None,
         checked: None,
     })
 }
 
 /// A run that never initialized, or that started again.
 fn initialization(run: &RunRecord) -> Option<RunFinding> {
-    let finding = |trust, statement: String, evidence: String, remedy: &str, since_ns| RunFinding {
-        trust,
-        source: FindingSource::Initialization,
-        statement,
-        evidence,
-        remedy: remedy.to_owned(),
-        since_ns,
-        checked: None,
-    };
+    let finding =
+        |trust, statement: String, evidence: String, remedy: &str, [since_ns, until_ns]: [Option<i64>; 2]| RunFinding {
+            trust,
+            source: FindingSource::Initialization,
+            statement,
+            evidence,
+            remedy: remedy.to_owned(),
+            since_ns,
+            until_ns,
+            checked: None,
+        };
     let initialized = run.steps.iter().any(|step| step.report.newest().is_some());
     if !initialized {
         if !run.has_ended() {
@@ -271,18 +294,21 @@ fn initialization(run: &RunRecord) -> Option<RunFinding> {
         };
         let others: Vec<String> =
             reasons.iter().skip(1).map(|(reason, images)| format!("{reason} ({images} images)")).collect();
-        return Some(finding(Trust::NotUsable, statement, others.join("; "), "", None));
+        return Some(finding(Trust::NotUsable, statement, others.join("; "), "", [None; 2]));
     }
     let restarts = run.steps.last().map_or(0, |step| step.report.restarts);
     let first = run.steps.iter().find(|step| step.report.restarts > 0)?;
     let stamp_ns = first.report.stamp_ns;
+    let last = run.steps.partition_point(|step| step.report.restarts < restarts);
+    let tracks_again = run.steps.iter().skip(last).find(|step| step.report.newest().is_some());
+    let until_ns = tracks_again.map(|step| step.report.stamp_ns);
     let times = if restarts == 1 { "once".to_owned() } else { format!("{restarts} times") };
     Some(finding(
         Trust::Doubtful,
         format!("the estimator failed and started again, {times}"),
         format!("first at {:.2} s", seconds_from_ns(stamp_ns)),
         "diagnose the run",
-        Some(stamp_ns),
+        [Some(stamp_ns), until_ns],
     ))
 }
 
@@ -305,6 +331,7 @@ fn disagreement(run: &RunRecord) -> Option<RunFinding> {
             evidence: "the residuals agree with their noise".to_owned(),
             remedy: "check stamps and frame of the ground truth".to_owned(),
             since_ns: None,
+            until_ns: None,
             checked: None,
         });
     }
@@ -315,13 +342,15 @@ fn disagreement(run: &RunRecord) -> Option<RunFinding> {
         Some(value) => format!("the residuals disagree with their noise: {}", in_words(value)),
         None => "the residuals disagree with their noise in a part of the run".to_owned(),
     };
+    let stamp_ns = |step: Option<usize>| step.and_then(|step| steps.get(step)).map(|step| step.stamp_ns);
     Some(RunFinding {
         trust: if largest_ratio > USELESS_RATIO { Trust::NotUsable } else { Trust::Doubtful },
         source: FindingSource::Residuals,
         statement,
         evidence: wrong.iter().map(in_words).collect::<Vec<_>>().join("; "),
         remedy: "diagnose the run".to_owned(),
-        since_ns: agreement::onset(steps).and_then(|step| steps.get(step)).map(|step| step.stamp_ns),
+        since_ns: stamp_ns(agreement::onset(steps)),
+        until_ns: stamp_ns(agreement::end(steps)),
         checked: None,
     })
 }
