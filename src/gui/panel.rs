@@ -79,7 +79,7 @@ pub struct Playback {
     pub breakpoints: Arc<Breakpoints>,
     /// True while the cursor runs to a hit that the estimators have not reached yet.
     pub running_to_breakpoint: bool,
-    /// The last diagnosis of a run, `None` without one.
+    /// Progress of the diagnosis of a run, `None` while there is none.
     pub diagnosis: Option<DiagnosisProgress>,
 }
 

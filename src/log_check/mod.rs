@@ -29,6 +29,7 @@ pub use self::clock_alignment::{
 pub use self::noise::{
     AllanPoint, AllanReport, AxisNoise, GivenNoise, NoiseTerm, NoiseTerms, SensorNoise, measure_noise,
 };
+pub(crate) use self::report::verdict::MOST_LIKELY;
 pub use self::report::verdict::{Trust, Verdict, joint_statement, problems};
 pub use self::report::{
     Area, CheckReport, Finding, FindingInterval, ImageRotation, ProposedMask, Severity, TopicReport,

@@ -31,7 +31,7 @@ mod result;
 #[cfg(test)]
 pub(crate) mod tests;
 
-pub use diagnosis::{Diagnosis, DiagnosisVerdict, LogFaults, RankedCause, WaitingReason, diagnose};
+pub use diagnosis::{LogFaults, diagnose};
 pub use engine::{
     BreakpointHit, CalibrationErrors, CalibrationRequest, CalibrationRun, CalibrationRunError, Computation,
     FlightNoiseError, SnapshotUse, Stopwatch, calibrate, camera_rotations, check_log, compute, compute_until,
@@ -48,14 +48,15 @@ pub use playback::{
     SavedBreakpoint, SavedFork, SavedLog, SavedPrior, SavedSession, SavedSessionError, Session, Wake,
 };
 pub use record::{
-    CalibrationRow, CollectedInformation, ComparedQuantity, Comparison, Divergence, FlightParameter, FlightVerdicts,
-    ForkOrigin, ImageResiduals, KnownLossSummary, LostSince, MeanResidual, ParameterSummary, PassProgress,
-    PoseConsistency, PoseError, PositionTruth, RELATIVE_LENGTHS_M, RankColumn, Recording, RelativeAccuracy,
-    ResidualSum, RunMemory, RunRecord, RunWarning, SolverPosition, SolverTrace, StepColumn, StepFactorRows, StepRecord,
-    TrajectoryAccuracy, TrajectoryEvaluation, TrajectoryLane, WarningLine, evaluate_trajectory, flight_advice,
-    flight_headline, least_determined, log_warning_lines, run_warning_lines, warning_lines,
+    CalibrationRow, CollectedInformation, ComparedQuantity, Comparison, Diagnosis, DiagnosisVerdict, Divergence,
+    FlightParameter, FlightVerdicts, ForkOrigin, ImageResiduals, KnownLossSummary, LostSince, MeanResidual,
+    ParameterSummary, PassProgress, PoseConsistency, PoseError, PositionTruth, RELATIVE_LENGTHS_M, RankColumn,
+    RankedCause, Recording, RelativeAccuracy, ResidualSum, RunMemory, RunRecord, RunWarning, SolverPosition,
+    SolverTrace, StepColumn, StepFactorRows, StepRecord, TrajectoryAccuracy, TrajectoryEvaluation, TrajectoryLane,
+    TruthAgreement, WaitingReason, WarningLine, evaluate_trajectory, flight_advice, flight_headline, least_determined,
+    log_warning_lines, run_warning_lines, warning_lines,
 };
 pub use result::{
-    Answer, FindingSource, RankSummary, Requirement, RunFinding, RunSummary, StageSummary, TimingSummary,
-    TruthAgreement, Withheld, flight_table, summarize,
+    Answer, FindingSource, RankSummary, Requirement, RunFinding, RunSummary, StageSummary, TimingSummary, Withheld,
+    flight_table, summarize,
 };

@@ -104,6 +104,17 @@ pub struct App {
     report: Option<Receiver<Result<PathBuf, String>>>,
 }
 
+/// Starts the diagnosis of the shown run when all runs have ended, if neither the check nor an earlier diagnosis explains
+/// why its results cannot be trusted.
+fn diagnose_unexplained(ctx: &mut PanelContext<'_>) {
+    let is_checked = ctx.recording.check.is_some() && !ctx.recording.is_being_checked;
+    let is_free = ctx.playback.diagnosis.is_none() && !ctx.recording.is_computing() && is_checked;
+    let Some(run) = ctx.selected_run().filter(|run| is_free && run.diagnosis.is_none()) else { return };
+    if ctx.answer(run).is_unexplained() {
+        ctx.commands.push(Command::Diagnose { run: ctx.run_number() });
+    }
+}
+
 impl App {
     /// Creates a window without a log; `theme` is used until the user chooses another one.
     pub fn new(open_log: OpenLog, desktop: Arc<dyn Desktop>, theme: ThemeName) -> Self {
@@ -291,6 +302,7 @@ impl App {
             commands: &mut commands,
         };
         window_ui(ui, &mut self.state, &mut context);
+        diagnose_unexplained(&mut context);
         let commanded = !commands.is_empty();
         for command in commands {
             log.apply(command);

@@ -25,7 +25,7 @@ impl PartialEq for Answers {
 #[derive(Debug)]
 struct KnownAnswer {
     run: u64,
-    state: (usize, bool, bool, RequiredAccuracy),
+    state: (usize, bool, bool, bool, RequiredAccuracy),
     answer: Arc<Answer>,
 }
 
@@ -36,7 +36,7 @@ impl Answers {
         known.retain(|it| recording.runs.iter().any(|run| run.id == it.run));
         let steps = if run.has_ended() { run.steps.len() } else { run.steps.len() / STEPS_AT_ONCE };
         let required = recording.rig.required_accuracy.clone();
-        let state = (steps, run.has_ended(), recording.check.is_some(), required);
+        let state = (steps, run.has_ended(), recording.check.is_some(), run.diagnosis.is_some(), required);
         if let Some(found) = known.iter().find(|it| it.run == run.id && it.state == state) {
             return Arc::clone(&found.answer);
         }

@@ -18,6 +18,7 @@ impl CsvTable for TimelinePanel {
     /// A row for every step of every run, followed by one for each of its notable events and findings and of the log's
     /// warnings.
     fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {
+        let answers: Vec<_> = ctx.recording.runs.iter().map(|run| ctx.answer(run)).collect();
         let rank = |step: Option<&StepRecord>, of: fn(&RankReport) -> usize| {
             step?.rank.as_ref().filter(|rank| !rank.parameters.is_empty()).map(of)
         };
@@ -40,7 +41,6 @@ impl CsvTable for TimelinePanel {
         let warning = |message| Some(("warning", None, None, message));
         let mut rows: Vec<LaneRow<'_>> =
             warnings.map(|it| (it.stamp_ns, "", None, warning(it.message.as_str()))).collect();
-        let answers: Vec<_> = ctx.recording.runs.iter().map(|run| ctx.answer(run)).collect();
         for (run, answer) in ctx.recording.runs.iter().zip(&answers) {
             for finding in &answer.findings {
                 let stamp_ns = finding.since_ns.unwrap_or(ctx.recording.start_ns);

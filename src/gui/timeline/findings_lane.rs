@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use egui::text::{LayoutJob, TextWrapping};
-use egui::{Painter, Rangef, Rect, Role, Stroke, Ui, WidgetInfo, pos2, vec2};
+use egui::{Painter, Rangef, Rect, Role, Stroke, Ui, WidgetInfo, pos2};
 
 use crate::gui::plot::PlotArea;
 use crate::gui::theme::{self, Theme};
@@ -56,8 +56,9 @@ impl FindingsLane {
     fn shown(&self, area: &PlotArea, lane: Rect) -> impl Iterator<Item = (&RunFinding, Rect)> {
         self.answer.findings.iter().zip(&self.rows).filter_map(move |(finding, row)| {
             let top = lane.top() + ROW_HEIGHT * (*row)? as f32;
-            let left = finding.since_ns.map_or(lane.left(), |since_ns| area.x(since_ns));
-            let right = finding.until_ns.map_or(lane.right(), |until_ns| area.x(until_ns)).max(left + MIN_WIDTH);
+            let left = finding.since_ns.map_or_else(|| lane.left(), |since_ns| area.x(since_ns));
+            let right =
+                finding.until_ns.map_or_else(|| lane.right(), |until_ns| area.x(until_ns)).max(left + MIN_WIDTH);
             let columns = Rangef::new(left, right).intersection(lane.x_range());
             let cell = Rect::from_x_y_ranges(columns, Rangef::new(top, top + ROW_HEIGHT - 1.0));
             (columns.span() > 0.0).then_some((finding, cell))
@@ -125,20 +126,16 @@ fn rows(findings: &[RunFinding], duration_ns: i64) -> Vec<Option<usize>> {
 mod tests {
     use std::sync::Arc;
 
-    use egui_kittest::kittest::Queryable as _;
-
     use super::*;
     use crate::faults::{Area, Severity};
-    use crate::gui::PanelName;
     use crate::gui::rendering::headless::{HeadlessOptions, draw};
     use crate::gui::samples::{sample_images, sample_recording};
     use crate::gui::tests::{keep_screenshot, with_context};
     use crate::gui::theme::ThemeName;
     use crate::gui::timeline::TimelinePanel;
-    use crate::gui::window::tests::{SECOND_NS, bench, bench_of, commands_of, sample};
     use crate::gui::{Panel as _, Selection};
     use crate::log_check::{Finding, FindingInterval};
-    use crate::session::{Command, FindingSource, Recording};
+    use crate::session::{FindingSource, Recording};
     use crate::text::Named as _;
 
     fn finding(severity: Severity, title: &str, times: [Option<f64>; 2]) -> Finding {
@@ -175,27 +172,16 @@ mod tests {
             since_ns: times[0],
             until_ns: times[1],
             checked: None,
+            cause: None,
         };
         let found = [[Some(20), Some(40)], [Some(60), Some(61)], [Some(30), None], [None; 2], [None; 2], [None; 2]];
         assert_eq!(rows(&found.map(of), 100), [Some(0), Some(0), Some(1), Some(2), Some(3), None]);
     }
 
     #[test]
-    fn a_click_on_a_finding_moves_the_cursor_to_its_start_and_shows_its_panel() {
-        assert!(bench().query_by_label("Finding from 2.000 to 4.500 s: stamps of cam0 run backwards").is_none());
-        let mut harness = bench_of(with_findings(sample()), [1600.0, 900.0]);
-        harness.state_mut().selection.wanted_panel = None;
-        let label = "Finding from 2.000 to 4.500 s: stamps of cam0 run backwards";
-        let pushed = commands_of(&mut harness, |harness| harness.get_by_label(label).click());
-        assert_eq!(pushed, [Command::Seek { stamp_ns: 2 * SECOND_NS }]);
-        harness.run_steps(2);
-        assert!(harness.state().window.tiles.layout.visible().contains(&PanelName::Image));
-    }
-
-    #[test]
     fn the_lane_is_drawn_with_findings_only() {
         let sound = sample_recording();
-        let faulty = with_findings((*sound).clone());
+        let faulty = with_findings(sound.clone());
         for (name, size_px) in [(ThemeName::Dark, [1600, 320]), (ThemeName::Light, [900, 260])] {
             let options = HeadlessOptions { size_px, pixels_per_point: 1.0, theme: name };
             let theme = Theme::of(name);
@@ -204,7 +190,9 @@ mod tests {
                 draw(options, |ui| {
                     theme.apply(ui.ctx());
                     let (mut images, mut selection) = (sample_images(), Selection::default());
-                    with_context(recording, SECOND_NS, &mut images, &mut selection, &theme, |ctx| panel.ui(ui, ctx));
+                    with_context(recording, 1_000_000_000, &mut images, &mut selection, &theme, |ctx| {
+                        panel.ui(ui, ctx);
+                    });
                 })
             };
             let drawn = screenshot(&faulty);

@@ -125,7 +125,7 @@ impl Panel for TimelinePanel {
         let origin = ui.input(|input| input.pointer.press_origin());
         let is_pressed = |rect: &Rect| origin.is_some_and(|origin| rect.contains(origin));
         let on_rows = self.parameters.rows_rect.filter(is_pressed);
-        let is_apart = on_rows.or(self.findings.rect.filter(is_pressed)).is_some();
+        let is_apart = on_rows.is_some() || self.findings.rect.is_some_and(|rect| is_pressed(&rect));
         let (clicks, wheel) = (if is_apart { Clicks::Brush } else { Clicks::Scrub }, Wheel::Zooms);
         let response = navigate(ui, ctx, &area, &Interaction { id, name: "Timeline", value: &value, clicks, wheel });
         step_by_assistance(ui, ctx, &response);

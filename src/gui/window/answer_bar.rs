@@ -1,12 +1,14 @@
 //! Bar under the menu: the answer of the shown run in one sentence, and what can be done about it.
 
+use std::time::Duration;
+
 use egui::{Align, Button, Label, Layout as UiLayout, RichText, Ui};
 
 use super::actions::Action;
 use crate::gui::theme::{MAX_RUNS, Theme};
 use crate::gui::{Dialog, PanelContext, findings};
 use crate::log_check::Trust;
-use crate::session::{Answer, Command, FindingSource, Recording, RunRecord};
+use crate::session::{Answer, Command, DiagnosisProgress, FindingSource, Recording, RunRecord};
 
 /// Height of the bar in points.
 pub(super) const HEIGHT: f32 = 30.0;
@@ -15,6 +17,11 @@ const SENTENCE_SIZE: f32 = 17.0;
 /// Width in points that the remedy needs beside the sentence; it is left out where there is less.
 const LEAST_REMEDY_WIDTH: f32 = 160.0;
 
+/// Width of the progress of a diagnosis in points.
+const PROGRESS_WIDTH: f32 = 220.0;
+/// Period at which the progress of a diagnosis is drawn.
+const PROGRESS_PERIOD: Duration = Duration::from_millis(250);
+
 /// Draws the answer of the shown run.
 pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, actions: &mut Vec<Action>) {
     let Some(run) = ctx.selected_run() else { return };
@@ -22,6 +29,9 @@ pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, actions: &mut Vec<Acti
     let theme = *ctx.theme;
     ui.with_layout(UiLayout::right_to_left(Align::Center), |ui| {
         let pending = pending(ctx.recording, run, &answer);
+        if let Some(progress) = &ctx.playback.diagnosis {
+            progress_ui(ui, ctx.commands, progress, &theme);
+        }
         if pending.is_none() {
             buttons_ui(ui, ctx, &answer, actions);
         }
@@ -53,16 +63,37 @@ fn pending(recording: &Recording, run: &RunRecord, answer: &Answer) -> Option<&'
     is_computing.then_some("… Computing; so far nothing speaks against this run")
 }
 
+/// Draws the progress of a diagnosis with the button that stops it.
+fn progress_ui(ui: &mut Ui, commands: &mut Vec<Command>, progress: &DiagnosisProgress, theme: &Theme) {
+    if ui.button("Stop").on_hover_text("End the diagnosis with what is known so far").clicked() {
+        commands.push(Command::StopDiagnosis);
+    }
+    let text = format!("diagnosing, {:.0} %: {}", 100.0 * progress.ratio, progress.label);
+    ui.scope(|ui| {
+        ui.set_max_width(PROGRESS_WIDTH);
+        ui.add(Label::new(RichText::new(&text).small().color(theme.text_weak)).truncate()).on_hover_text(&text);
+    });
+    ui.ctx().request_repaint_after(PROGRESS_PERIOD);
+}
+
 /// Draws the buttons of the first finding, from right to left.
 fn buttons_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, answer: &Answer, actions: &mut Vec<Action>) {
     let Some(first) = answer.findings.first() else { return };
-    if first.source != FindingSource::GroundTruth && ui.button("Diagnose").on_hover_text("Find the cause (D)").clicked()
-    {
+    let is_running = ctx.playback.diagnosis.is_some();
+    let (name, hint) = match ctx.selected_run().and_then(|run| run.diagnosis.as_ref()) {
+        Some(_) => ("Causes", "All causes that the diagnosis tried (D)"),
+        None => ("Diagnose", "Find the cause (D)"),
+    };
+    if first.source != FindingSource::GroundTruth && !is_running && ui.button(name).on_hover_text(hint).clicked() {
         actions.push(Action::Dialog(Dialog::Diagnosis));
     }
-    if let Some((changes, from_ns)) = first.correction(&ctx.recording.rig) {
-        let button = ui.add_enabled(ctx.recording.runs.len() < MAX_RUNS, Button::new("Apply and run again"));
-        if button.on_hover_text(format!("Fork with {changes}")).clicked() {
+    let named = answer.named();
+    for (place, finding) in named.iter().enumerate().rev() {
+        let Some((changes, from_ns)) = finding.correction(&ctx.recording.rig) else { continue };
+        let name =
+            if named.len() == 1 { "Apply and run again".to_owned() } else { format!("Apply cause {}", place + 1) };
+        let button = ui.add_enabled(ctx.recording.runs.len() < MAX_RUNS, Button::new(name));
+        if button.on_hover_text(format!("{}\nFork with {changes}", finding.statement)).clicked() {
             ctx.commands.push(Command::Seek { stamp_ns: from_ns });
             ctx.commands.push(Command::Fork { run: ctx.run_number(), changes, label: None });
         }
@@ -96,10 +127,12 @@ fn hover_text(answer: &Answer) -> String {
 mod tests {
     use std::sync::Arc;
 
+    use egui_kittest::Harness;
     use egui_kittest::kittest::Queryable as _;
 
     use crate::faults::{Area, Fault, FaultKind, Severity};
-    use crate::gui::window::tests::{bench, bench_of, commands_of, sample};
+    use crate::gui::PanelName;
+    use crate::gui::window::tests::{Bench, SECOND_NS, bench, bench_of, commands_of, sample};
     use crate::log_check::{Finding, FindingInterval};
     use crate::session::Command;
 
@@ -116,6 +149,29 @@ mod tests {
         };
         let all = [(false, false), (false, true), (true, false), (true, true)];
         assert_eq!(all.map(|(checked, finished)| sentence(checked, finished)), [Some(0), Some(0), Some(1), Some(2)]);
+    }
+
+    #[test]
+    fn a_click_on_a_finding_of_the_timeline_moves_the_cursor_to_its_start_and_shows_its_panel() {
+        let label = "Finding from 2.000 to 3.500 s: stamps of cam0 run backwards";
+        assert!(bench().query_by_label(label).is_none());
+        let mut recording = sample();
+        recording.check = Some(Arc::new(vec![Finding {
+            severity: Severity::Error,
+            area: Area::Time,
+            title: "stamps of cam0 run backwards".to_owned(),
+            evidence: String::new(),
+            remedy: String::new(),
+            interval: FindingInterval { since_s: Some(2.0), until_s: Some(3.5) },
+            is_assumption: false,
+            faults: Vec::new(),
+        }]));
+        let mut harness = bench_of(recording, [1600.0, 900.0]);
+        let is_shown = |harness: &Harness<'_, Bench>| harness.state().window.tiles.focus == Some(PanelName::Residuals);
+        assert!(!is_shown(&harness));
+        let pushed = commands_of(&mut harness, |harness| harness.get_by_label(label).click());
+        assert_eq!(pushed, [Command::Seek { stamp_ns: 2 * SECOND_NS }]);
+        assert!(is_shown(&harness));
     }
 
     #[test]

@@ -74,20 +74,21 @@ pub fn problems(findings: &[Finding]) -> Vec<&Finding> {
     problems
 }
 
-/// Statement of the findings with the largest effect: the first one, or causes that are about equally likely.
-pub fn joint_statement(findings: &[&Finding]) -> String {
-    let alternatives: Vec<&str> = findings.iter().map_while(|it| it.title.strip_prefix(MOST_LIKELY)).collect();
-    match (alternatives.as_slice(), findings.first()) {
+/// Statement of the findings with the largest effect, by their statements: the first one, or causes that are about equally
+/// likely.
+pub fn joint_statement(statements: &[&str]) -> String {
+    let alternatives: Vec<&str> = statements.iter().map_while(|it| it.strip_prefix(MOST_LIKELY)).collect();
+    match (alternatives.as_slice(), statements.first()) {
         ([first, others @ ..], _) => {
             others.iter().fold(format!("{MOST_LIKELY}{first}"), |all, other| format!("{all}, or {other}"))
         }
-        ([], Some(first)) => first.title.clone(),
+        ([], Some(first)) => (*first).to_owned(),
         ([], None) => String::new(),
     }
 }
 
-/// First words of the title of a cause that is not the only one.
-const MOST_LIKELY: &str = "most likely ";
+/// First words of the statement of a cause that is not the only one.
+pub(crate) const MOST_LIKELY: &str = "most likely ";
 
 /// Trust in the results of a log, with its most important findings.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -107,10 +108,11 @@ impl Verdict {
         let (errors, warnings) = (count(Severity::Error), count(Severity::Warning));
         let trust = findings.iter().map(Trust::after).max().unwrap_or_default();
         let problems = problems(findings);
+        let titles: Vec<&str> = problems.iter().map(|it| it.title.as_str()).collect();
         let sentence = match trust {
             Trust::Trusted => format!("{} {NO_FAULT}", trust.mark()),
             Trust::Doubtful | Trust::NotUsable => {
-                trust.sentence(problems.first().and_then(|it| it.since_s()), &joint_statement(&problems))
+                trust.sentence(problems.first().and_then(|it| it.since_s()), &joint_statement(&titles))
             }
         };
         let first = problems.into_iter().take(NAMED).cloned().collect();

@@ -18,7 +18,6 @@ use super::axes::plausible_axes;
 use super::cost_bound::CostBound;
 use super::hypotheses::{TrialHypothesis, changes_at, first_hypotheses};
 use super::measured::{LogFaults, Undoing};
-use super::outcome::{Diagnosis, DiagnosisVerdict, RankedCause, WaitingReason};
 use super::ranking::{RankedTrial, by_cause, decide};
 use super::refinement::refined;
 use super::scoring::{LOST, Trials, scored};
@@ -34,8 +33,8 @@ use crate::session::engine::{Computation, History};
 use crate::session::misfit::Misfit;
 use crate::session::misfit::agreement::{self, AgreementValue};
 use crate::session::plan::ForkChanges;
-use crate::session::record::RunRecord;
-use crate::session::result::{TruthAgreement, truth};
+use crate::session::record::{Diagnosis, DiagnosisVerdict, RankedCause, RunRecord, TruthAgreement, WaitingReason};
+use crate::session::result::truth;
 
 /// Causes that are computed again on more of the run.
 const CONFIRMED: usize = 6;
@@ -81,7 +80,13 @@ pub(in crate::session) fn diagnose_run(
     let inputs = (0..record.steps.len()).map_while(|step| history.inputs().get(step)).collect();
     let (spec, camera_key) = (&record.spec, &*record.camera_key);
     let diagnosed = DiagnosedRun { rig, spec, camera_key, inputs, interrupted: &interrupted };
-    Search { run: &diagnosed, history, record, check, trials: 0, on_progress }.diagnosis()
+    let mut search = Search { run: &diagnosed, history, record, check, trials: 0, not_tried: Vec::new(), on_progress };
+    let mut diagnosis = Diagnosis::before_trials(record.spec.label.clone());
+    search.fill(&mut diagnosis);
+    diagnosis.trials = search.trials;
+    diagnosis.interrupted = search.is_interrupted();
+    diagnosis.not_tried = search.not_tried;
+    diagnosis
 }
 
 /// A search in progress.
@@ -91,17 +96,16 @@ struct Search<'a, 'b> {
     record: &'a RunRecord,
     check: &'a dyn Fn() -> Vec<Finding>,
     trials: usize,
+    /// Causes that an interrupt left untried.
+    not_tried: Vec<FaultKind>,
     on_progress: &'a mut OnProgress<'b>,
 }
 
 impl Search<'_, '_> {
-    fn diagnosis(&mut self) -> Diagnosis {
-        let mut diagnosis = Diagnosis::before_trials(self.record.spec.label.clone());
-        let Some(whole) = self.whole() else { return diagnosis };
+    fn fill(&mut self, diagnosis: &mut Diagnosis) {
+        let Some(whole) = self.whole() else { return };
         self.report(0.02, "the run without a change");
-        let Some(given) = self.run.trial(&whole, 0, &ForkChanges::default(), None) else {
-            return diagnosis;
-        };
+        let Some(given) = self.run.trial(&whole, 0, &ForkChanges::default(), None) else { return };
         let misfit = Misfit::of(&given.steps, given.initialized_ns().unwrap_or_default());
         diagnosis.values = agreement::values(&misfit);
         diagnosis.accuracy = truth::accuracy(self.record);
@@ -116,15 +120,11 @@ impl Search<'_, '_> {
         self.report(0.03, "check of the log");
         if !self.is_interrupted() {
             diagnosis.log_faults = (self.check)();
-            let ends =
-                diagnosis.verdict == DiagnosisVerdict::Agrees || self.undo_measured(&mut diagnosis, &given, onset);
+            let ends = diagnosis.verdict == DiagnosisVerdict::Agrees || self.undo_measured(diagnosis, &given, onset);
             if !ends {
-                self.search(&mut diagnosis, &given, misfit.tracked_ratio() < LOST, onset);
+                self.search(diagnosis, &given, misfit.tracked_ratio() < LOST, onset);
             }
         }
-        diagnosis.trials = self.trials;
-        diagnosis.interrupted = self.is_interrupted();
-        diagnosis
     }
 
     /// Undoes the faults that the check of the log measures. True if that explains the residuals, or if an error can only be
@@ -219,7 +219,15 @@ impl Search<'_, '_> {
         let bound = bound(&given);
         let count = hypotheses.len();
         let mut open = hypotheses;
+        let mut tried: Vec<FaultKind> = done.iter().map(|(it, _): &(TrialHypothesis, _)| it.cause).collect();
         while !open.is_empty() {
+            if self.is_interrupted() {
+                self.not_tried = open.iter().map(|it| it.cause).filter(|cause| !tried.contains(cause)).collect();
+                self.not_tried.sort();
+                self.not_tried.dedup();
+                break;
+            }
+            tried.extend(open.iter().take(AT_ONCE).map(|it| it.cause));
             let rest = open.split_off(AT_ONCE.min(open.len()));
             let run = self.run;
             let trial = |it: TrialHypothesis| {
@@ -288,6 +296,7 @@ impl Search<'_, '_> {
             from_ns: self.run.inputs.get(step).map_or(0, |input| input.stamp_ns),
             from_s: self.stamp_s(step),
             parameters: hypothesis.parameters,
+            since_ns: hypothesis.from.and_then(|step| self.run.inputs.get(step)).map(|input| input.stamp_ns),
             beyond_search: candidate.beyond_search,
             gain: given - candidate.score,
             values,

@@ -4,7 +4,7 @@
 //! - `hypotheses`, `axes`, `refinement`, `tuning`: the causes that are tried, with the values to try.
 //! - `scoring`, `ranking`: the best cause of each kind, and whether it is decisive.
 //! - `measured`: faults that the check of the log measures, and the changes that undo them.
-//! - `statement`, `outcome`: the result in words.
+//! - `statement`: the causes in words.
 //! - `diagnose`: the search.
 
 mod axes;
@@ -12,7 +12,6 @@ mod cost_bound;
 mod diagnose;
 mod hypotheses;
 mod measured;
-mod outcome;
 mod ranking;
 mod refinement;
 mod scoring;
@@ -25,4 +24,3 @@ pub use diagnose::diagnose;
 #[cfg(test)]
 pub(in crate::session) use diagnose::diagnose_run;
 pub use measured::LogFaults;
-pub use outcome::{Diagnosis, DiagnosisVerdict, RankedCause, WaitingReason};

@@ -5,11 +5,11 @@
 //! image that is not used is compared on the other half.
 
 use super::hypotheses::TrialHypothesis;
-use super::outcome::DiagnosisVerdict;
 use super::trial::TrialResult;
 use crate::faults::{Choice, Explanation, Fault, FaultKind, MOST_REMAINING, criterion};
 use crate::session::misfit::agreement::disagreement;
 use crate::session::misfit::{Misfit, Scale};
+use crate::session::record::DiagnosisVerdict;
 
 /// Trial of a hypothesis with its averages over the scored steps.
 #[derive(Clone, Debug)]

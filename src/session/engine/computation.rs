@@ -11,7 +11,7 @@ use crate::log_check::Finding;
 use crate::sensors::RequiredAccuracy;
 use crate::session::plan::SessionPlan;
 use crate::session::record::{
-    PassProgress, Recording, RunRecord, SolverPosition, SolverTrace, StepFactorRows, StepRecord,
+    Diagnosis, PassProgress, Recording, RunRecord, SolverPosition, SolverTrace, StepFactorRows, StepRecord,
 };
 
 /// Divisor of the memory budget: estimator snapshots may take half of it. They take precedence over complete steps:
@@ -83,6 +83,13 @@ impl Computation {
     /// Accuracy with which the calibration is compared from now on.
     pub fn set_required_accuracy(&mut self, required: RequiredAccuracy) {
         Arc::make_mut(&mut self.recording_mut().rig).required_accuracy = required;
+    }
+
+    /// Stores the result of a diagnosis of the run with an id, on which its answer depends.
+    pub(in crate::session) fn set_diagnosis(&mut self, run: u64, diagnosis: Option<Diagnosis>) {
+        if let Some(run) = self.recording_mut().runs.iter_mut().find(|it| it.id == run) {
+            run.diagnosis = diagnosis.map(Arc::new);
+        }
     }
 
     /// Stores a message of the engine in the record.

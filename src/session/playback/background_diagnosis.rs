@@ -8,11 +8,12 @@ use std::thread::{Builder, JoinHandle};
 use parking_lot::Mutex;
 use rayon::ThreadPoolBuilder;
 
-use crate::session::diagnosis::{Diagnosis, LogFaults, diagnose};
+use crate::session::diagnosis::{LogFaults, diagnose};
 use crate::session::engine::Computation;
 use crate::session::plan::SessionError;
+use crate::session::record::Diagnosis;
 
-/// Progress of a diagnosis, and its result.
+/// Progress of a diagnosis; its result is [`RunRecord::diagnosis`](crate::session::RunRecord::diagnosis).
 #[derive(Clone, Debug, PartialEq)]
 pub struct DiagnosisProgress {
     /// [`RunRecord::id`](crate::session::RunRecord::id) of the run.
@@ -21,8 +22,6 @@ pub struct DiagnosisProgress {
     pub ratio: f64,
     /// The change that was tried last.
     pub label: String,
-    /// `None` until the diagnosis has ended.
-    pub result: Option<Arc<Diagnosis>>,
 }
 
 /// A diagnosis on its thread. Dropping it ends it.
@@ -34,11 +33,14 @@ pub(super) struct BackgroundDiagnosis {
 }
 
 impl BackgroundDiagnosis {
-    /// Starts the diagnosis of run number `run` of a computation, on all cores but one.
-    pub(super) fn start(computation: Computation, run: usize) -> Result<Self, SessionError> {
+    /// Starts the diagnosis of run number `run` of a computation, on all cores but one; `store` gets its result.
+    pub(super) fn start(
+        computation: Computation,
+        run: usize,
+        store: impl FnOnce(Diagnosis) + Send + 'static,
+    ) -> Result<Self, SessionError> {
         let id = computation.recording().runs.get(run).map_or(0, |run| run.id);
-        let progress =
-            Arc::new(Mutex::new(DiagnosisProgress { run: id, ratio: 0.0, label: String::new(), result: None }));
+        let progress = Arc::new(Mutex::new(DiagnosisProgress { run: id, ratio: 0.0, label: String::new() }));
         let cancelled = Arc::new(AtomicBool::new(false));
         let (shared, stop) = (Arc::clone(&progress), Arc::clone(&cancelled));
         let work = move || {
@@ -49,9 +51,9 @@ impl BackgroundDiagnosis {
             };
             let checked = computation.recording().check.as_deref();
             let faults = checked.map_or_else(LogFaults::default, |findings| LogFaults::among(findings));
-            let found = diagnose(&computation, run, &faults, &mut on_progress);
-            let mut progress = shared.lock();
-            (progress.ratio, progress.result) = (1.0, found.map(Arc::new));
+            if let Some(found) = diagnose(&computation, run, &faults, &mut on_progress) {
+                store(found);
+            }
         };
         let threads = std::thread::available_parallelism().map_or(1, |cores| cores.get().saturating_sub(1).max(1));
         let apart = move || match ThreadPoolBuilder::new().num_threads(threads).build() {
@@ -62,8 +64,10 @@ impl BackgroundDiagnosis {
         Ok(Self { progress, cancelled, thread: Some(thread.map_err(|source| SessionError::Thread { source })?) })
     }
 
-    pub(super) fn progress(&self) -> DiagnosisProgress {
-        self.progress.lock().clone()
+    /// Progress; `None` when the diagnosis has ended.
+    pub(super) fn progress(&self) -> Option<DiagnosisProgress> {
+        let is_running = self.thread.as_ref().is_some_and(|thread| !thread.is_finished());
+        is_running.then(|| self.progress.lock().clone())
     }
 
     /// Ends it after the changes that are being tried, with what is known so far.

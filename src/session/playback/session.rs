@@ -271,15 +271,17 @@ impl Session {
         }
     }
 
-    /// Progress and result of the last diagnosis.
+    /// Progress of the diagnosis; `None` while there is none.
     pub fn diagnosis(&self) -> Option<DiagnosisProgress> {
-        self.diagnosis.as_ref().map(BackgroundDiagnosis::progress)
+        self.diagnosis.as_ref().and_then(BackgroundDiagnosis::progress)
     }
 
     fn diagnose(&mut self, run: usize) {
         // The earlier diagnosis ends first.
         self.diagnosis = None;
-        match BackgroundDiagnosis::start(self.computation(), run) {
+        let Some(id) = self.recording().runs.get(run).map(|run| run.id) else { return };
+        self.shared.change(|computation| computation.set_diagnosis(id, None));
+        match BackgroundDiagnosis::start(self.computation(), run, self.shared.receiver_of_diagnosis(id)) {
             Ok(diagnosis) => self.diagnosis = Some(diagnosis),
             Err(error) => self.notices.push(error.to_string()),
         }

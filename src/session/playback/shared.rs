@@ -11,7 +11,7 @@ use parking_lot::Mutex;
 use crate::log_check::Finding;
 use crate::session::engine::{Computation, EngineMessage, RecomputeRequest, Recomputed};
 use crate::session::plan::SessionError;
-use crate::session::record::Recording;
+use crate::session::record::{Diagnosis, Recording};
 
 struct SharedState {
     computation: Mutex<Computation>,
@@ -87,6 +87,17 @@ impl SharedComputation {
             }
         };
         (has_begun, store)
+    }
+
+    /// Function that stores the result of a diagnosis of the run with an id.
+    pub(super) fn receiver_of_diagnosis(&self, run: u64) -> impl FnOnce(Diagnosis) + Send + 'static {
+        let state = Arc::clone(&self.state);
+        move |diagnosis| {
+            state.change(|computation| computation.set_diagnosis(run, Some(diagnosis)));
+            if let Some(wake) = state.wake.lock().as_ref() {
+                wake();
+            }
+        }
     }
 
     /// Sets the function that is called when a step at the cursor has been recomputed.

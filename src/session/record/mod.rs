@@ -4,6 +4,7 @@ mod antenna_record;
 mod calibration_columns;
 mod collected_information;
 mod comparison;
+mod diagnosis;
 mod flight_parameter;
 mod flight_verdicts;
 mod image_residuals;
@@ -19,12 +20,14 @@ mod step_columns;
 mod summary;
 mod trajectory_accuracy;
 mod trajectory_lane;
+mod truth_agreement;
 mod warning_lines;
 
 pub use antenna_record::PositionTruth;
 pub use calibration_columns::CalibrationRow;
 pub use collected_information::CollectedInformation;
 pub use comparison::{ComparedQuantity, Comparison, Divergence};
+pub use diagnosis::{Diagnosis, DiagnosisVerdict, RankedCause, WaitingReason};
 pub(in crate::session) use flight_parameter::optional_seconds;
 pub use flight_parameter::{FlightParameter, ParameterSummary};
 pub(in crate::session) use flight_verdicts::flight_rows;
@@ -45,4 +48,5 @@ pub use trajectory_accuracy::{
     RELATIVE_LENGTHS_M, RelativeAccuracy, TrajectoryAccuracy, TrajectoryEvaluation, evaluate_trajectory,
 };
 pub use trajectory_lane::TrajectoryLane;
+pub use truth_agreement::TruthAgreement;
 pub use warning_lines::{WarningLine, log_warning_lines, run_warning_lines, warning_lines};

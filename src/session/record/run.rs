@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::antenna_record::{AntennaRecord, PositionTruth};
+use super::diagnosis::Diagnosis;
 use super::image_residuals::ImageResiduals;
 use super::solver_trace::SolverTrace;
 use super::step::{RunWarning, StepFactorRows, StepRecord, add_warnings, warnings_of};
@@ -81,6 +82,8 @@ pub struct RunRecord {
     pub(super) antenna: AntennaRecord,
     /// Residuals of each step by sensor.
     pub(in crate::session) misfits: Vec<StepMisfit>,
+    /// Result of the last diagnosis; `None` without one.
+    pub diagnosis: Option<Arc<Diagnosis>>,
     /// Residuals of every image in the step of that image, by place in the image.
     pub image_residuals: ImageResiduals,
     /// Warnings of its steps, each message once.
@@ -116,6 +119,7 @@ impl RunRecord {
             position_truth: None,
             antenna: AntennaRecord::default(),
             misfits: Vec::new(),
+            diagnosis: None,
             image_residuals: ImageResiduals::default(),
             warnings: Vec::new(),
             memory: RunMemory::default(),

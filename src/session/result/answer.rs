@@ -9,13 +9,13 @@ use super::truth;
 use crate::faults::{Area, Fault, FaultKind, Sensor};
 use crate::geometry::{ns_from_seconds, seconds_from_ns};
 use crate::gimbal::ParameterId;
-use crate::log_check::{Finding, Trust, joint_statement, problems};
+use crate::log_check::{Finding, MOST_LIKELY, Trust, joint_statement, problems};
 use crate::observability::Determination;
 use crate::sensors::Rig;
 use crate::session::misfit::agreement::{self, AgreementValue};
 use crate::session::misfit::{Misfit, StepMisfit};
 use crate::session::plan::ForkChanges;
-use crate::session::record::{Recording, RunRecord, StepRecord, optional_seconds};
+use crate::session::record::{RankedCause, Recording, RunRecord, StepRecord, optional_seconds};
 
 /// Fewest steps with a window from which the residuals of a run are judged: the first windows settle.
 const JUDGED_STEPS: usize = 40;
@@ -34,6 +34,8 @@ pub enum FindingSource {
     /// Residuals that disagree with their noise.
     Residuals,
     GroundTruth,
+    /// A diagnosis: what explains residuals that disagree with their noise.
+    Diagnosis,
 }
 
 /// Reason why results of a run are doubtful or useless.
@@ -56,6 +58,9 @@ pub struct RunFinding {
     /// Finding of the check with the faults of measurements or rig.
     #[serde(skip)]
     pub checked: Option<Finding>,
+    /// Cause that a diagnosis found.
+    #[serde(skip)]
+    pub cause: Option<RankedCause>,
 }
 
 impl RunFinding {
@@ -80,19 +85,24 @@ impl RunFinding {
         self.checked.as_ref().map_or_else(|| self.since_ns.map(seconds_from_ns), Finding::since_s)
     }
 
-    /// Subject of the check that found it; `None` for a finding of the run itself.
+    /// Subject of its fault; `None` for a finding of the run itself.
     pub fn area(&self) -> Option<Area> {
-        self.checked.as_ref().map(|finding| finding.area)
+        let of_cause = || self.cause.as_ref().map(|cause| cause.cause.row().area);
+        self.checked.as_ref().map(|finding| finding.area).or_else(of_cause)
     }
 
     /// Fault of measurements or rig; `None` if none is known.
     pub fn fault(&self) -> Option<&Fault> {
-        self.checked.as_ref()?.faults.first()
+        let of_cause = || self.cause.as_ref().map(|cause| &cause.changes.corrections);
+        self.checked.as_ref().map(|finding| &finding.faults).or_else(of_cause)?.first()
     }
 
     /// Changes of a fork that undo the fault, and the stamp of its first step in nanoseconds since the log began; `None` if
     /// no fault is known or no constant correction undoes it.
     pub fn correction(&self, rig: &Rig) -> Option<(ForkChanges, i64)> {
+        if let Some(cause) = self.cause.as_ref().filter(|cause| !cause.beyond_search) {
+            return Some((cause.changes.clone(), cause.from_ns));
+        }
         let [fault] = self.checked.as_ref()?.faults.as_slice() else { return None };
         if !fault.can_be_corrected(rig.joint_names().len()) {
             return None;
@@ -146,12 +156,24 @@ impl Answer {
         self.trust == Trust::Trusted && self.requirement.as_ref().is_none_or(|it| it.met == it.parameters)
     }
 
+    /// Findings that the sentence names: the first one, or causes that are about equally likely.
+    pub fn named(&self) -> &[RunFinding] {
+        let likely = self.findings.iter().take_while(|it| it.statement.starts_with(MOST_LIKELY)).count();
+        &self.findings[..likely.max(1).min(self.findings.len())]
+    }
+
+    /// True if residuals or start of the run are the first reason to doubt, for which neither the check nor a diagnosis has a
+    /// cause.
+    pub fn is_unexplained(&self) -> bool {
+        let source = self.findings.first().map(|first| first.source);
+        matches!(source, Some(FindingSource::Residuals | FindingSource::Initialization))
+    }
+
     /// The same from the findings of the check of the log.
     pub(in crate::session) fn of(rig: &Rig, check: &[Finding], run: &RunRecord) -> Self {
         let mut findings: Vec<RunFinding> = check_findings(rig, check, run).collect();
         findings.extend(missing_joint_angles(rig, run));
-        findings.extend(initialization(run));
-        findings.extend(disagreement(run));
+        findings.extend(with_diagnosis(run, initialization(run).into_iter().chain(disagreement(run)).collect()));
         // A stable sort: the sources have the order of what they say about a cause.
         findings.sort_by_key(|finding| (!finding.is_cause(), std::cmp::Reverse(finding.trust)));
         let trust = findings.iter().map(|finding| finding.trust).max().unwrap_or_default();
@@ -166,11 +188,37 @@ impl Answer {
     }
 }
 
-/// Statement of the first finding; causes that the check finds about equally likely are one statement.
+/// Statement of the first finding; causes that are about equally likely are one statement.
 fn statement(findings: &[RunFinding]) -> String {
-    let Some(first) = findings.first() else { return String::new() };
-    let checked: Vec<&Finding> = findings.iter().map_while(|it| it.checked.as_ref()).collect();
-    if checked.is_empty() { first.statement.clone() } else { joint_statement(&checked) }
+    let of_source = findings.chunk_by(|one, other| one.source == other.source).next().unwrap_or_default();
+    joint_statement(&of_source.iter().map(|it| it.statement.as_str()).collect::<Vec<_>>())
+}
+
+/// Findings about the residuals or the start of a run, after the causes that a diagnosis found for them.
+fn with_diagnosis(run: &RunRecord, mut findings: Vec<RunFinding>) -> Vec<RunFinding> {
+    let unexplained = |it: &&mut RunFinding| it.source != FindingSource::GroundTruth;
+    let trust = findings.iter().map(|it| it.trust).max().unwrap_or_default();
+    let (Some(first), Some(diagnosis)) = (findings.iter_mut().find(unexplained), &run.diagnosis) else {
+        return findings;
+    };
+    // The check states the faults that it measures itself.
+    if diagnosis.is_open() || diagnosis.explaining == 0 || diagnosis.measured {
+        first.remedy = format!("diagnosis: {}", diagnosis.headline());
+        return findings;
+    }
+    let explaining = diagnosis.causes.iter().take(diagnosis.explaining);
+    let causes = explaining.map(|cause| RunFinding {
+        trust,
+        source: FindingSource::Diagnosis,
+        statement: if diagnosis.explaining == 1 { cause.statement.clone() } else { cause.as_alternative() },
+        evidence: format!("with this change: {}", cause.text()),
+        remedy: cause.remedy.clone(),
+        since_ns: cause.since_ns,
+        until_ns: None,
+        checked: None,
+        cause: Some(cause.clone()),
+    });
+    causes.chain(findings).collect()
 }
 
 /// Sentence about a trusted run without estimated parameters.
@@ -195,9 +243,10 @@ fn check_findings<'a>(rig: &'a Rig, check: &'a [Finding], run: &'a RunRecord) ->
             statement: finding.title.clone(),
             evidence: finding.evidence.clone(),
             remedy: finding.remedy.clone(),
-            since_ns: finding.interval.since_s.or(finding.since_s()).map(ns_from_seconds),
+            since_ns: finding.interval.since_s.or_else(|| finding.since_s()).map(ns_from_seconds),
             until_ns: finding.interval.until_s.map(ns_from_seconds),
             checked: Some(finding.clone()),
+            cause: None,
         })
     })
 }
@@ -264,6 +313,7 @@ fn missing_joint_angles(rig: &Rig, run: &RunRecord) -> Option<RunFinding> {
         since_ns: None,
         until_ns: None,
         checked: None,
+        cause: None,
     })
 }
 
@@ -279,6 +329,7 @@ fn initialization(run: &RunRecord) -> Option<RunFinding> {
             since_ns,
             until_ns,
             checked: None,
+            cause: None,
         };
     let initialized = run.steps.iter().any(|step| step.report.newest().is_some());
     if !initialized {
@@ -333,6 +384,7 @@ fn disagreement(run: &RunRecord) -> Option<RunFinding> {
             since_ns: None,
             until_ns: None,
             checked: None,
+            cause: None,
         });
     }
     let mut wrong: Vec<AgreementValue> = agreement::values(&misfit).into_iter().filter(|it| !it.agrees()).collect();
@@ -352,6 +404,7 @@ fn disagreement(run: &RunRecord) -> Option<RunFinding> {
         since_ns: stamp_ns(agreement::onset(steps)),
         until_ns: stamp_ns(agreement::end(steps)),
         checked: None,
+        cause: None,
     })
 }
 

@@ -12,5 +12,4 @@ mod withheld;
 
 pub use answer::{Answer, FindingSource, Requirement, RunFinding};
 pub use run_summary::{RankSummary, RunSummary, StageSummary, TimingSummary, summarize};
-pub use truth::TruthAgreement;
 pub use withheld::{Withheld, flight_table};

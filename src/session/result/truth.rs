@@ -1,27 +1,10 @@
 //! Ground truth against a run whose residuals agree with their noise.
 
 use nalgebra::Vector3;
-use serde::Serialize;
 
 use crate::geometry::seconds_from_ns;
 use crate::session::accuracy::{AlignmentSums, TrajectoryAlignment};
-use crate::session::record::{PoseError, RunRecord};
-
-/// Errors against ground truth.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct TruthAgreement {
-    /// Root mean square of the position error after alignment.
-    pub ate_m: f64,
-    /// Mean normalized error squared of the poses, 6 for consistent covariances.
-    pub nees: Option<f64>,
-}
-
-impl TruthAgreement {
-    pub(in crate::session) fn text(&self) -> String {
-        let nees = self.nees.map_or_else(String::new, |nees| format!(", NEES {nees:.1} (6 is consistent)"));
-        format!("ATE {:.3} m{nees}", self.ate_m)
-    }
-}
+use crate::session::record::{PoseError, RunRecord, TruthAgreement};
 
 /// Mean NEES and ratio of the position error to the length of the path above which the ground truth disagrees; 6 is
 /// consistent, and estimators are a few times too certain.

@@ -1,9 +1,11 @@
 //! Answers of runs: what is said first about flights with and without a fault.
 
+use std::sync::Arc;
+
 use crate::estimator::EventKind;
 use crate::faults::{Area, Fault, FaultKind, Severity};
 use crate::log_check::{Finding, FindingInterval, Trust};
-use crate::session::record::RunRecord;
+use crate::session::record::{Diagnosis, DiagnosisVerdict, RankedCause, RunRecord};
 use crate::session::result::{Answer, FindingSource};
 use crate::session::tests::memory::{estimated, recorded};
 use crate::simulation::{SyntheticFlight, SyntheticOptions, synthetic_tracks};
@@ -91,6 +93,49 @@ fn residuals_that_disagree_are_said_without_a_cause() {
     assert!(found.trust > Trust::Trusted, "{found:?}");
     assert!(found.findings.iter().any(|it| it.source == FindingSource::Residuals), "{found:?}");
     assert_eq!(found.remedy, "diagnose the run");
+}
+
+#[test]
+fn a_diagnosis_names_the_cause_of_residuals_that_disagree() {
+    let mut flight = flight();
+    let camera = &mut flight.given_rig.cameras[0];
+    camera.model.intrinsics_px[0] *= 1.3;
+    camera.model.intrinsics_px[1] *= 1.3;
+    let mut run = estimated(&flight, "auto");
+    assert!(answer(&flight, &[], &run).is_unexplained());
+    let cause = |statement: &str, changes: &str| RankedCause {
+        cause: FaultKind::Focal,
+        statement: statement.to_owned(),
+        remedy: "calibrate cam0".to_owned(),
+        changes: changes.parse().unwrap(),
+        from_ns: 0,
+        from_s: 0.0,
+        since_ns: Some(1_000_000_000),
+        parameters: 1,
+        beyond_search: false,
+        gain: 8000.0,
+        values: Vec::new(),
+        accuracy: None,
+    };
+    let causes = vec![cause("the focal length is wrong", "correct=focal:0.77"), cause("cam0 zooms", "chain-prior=5")];
+    let one = Diagnosis { verdict: DiagnosisVerdict::Cause, explaining: 1, causes, ..Diagnosis::default() };
+    let mut with = |diagnosis: Diagnosis| {
+        run.diagnosis = Some(Arc::new(diagnosis));
+        answer(&flight, &[], &run)
+    };
+    let found = with(one.clone());
+    assert!(found.sentence.ends_with("since 1.0 s: the focal length is wrong"), "{}", found.sentence);
+    assert_eq!((found.remedy.as_str(), found.findings[0].source), ("calibrate cam0", FindingSource::Diagnosis));
+    let (changes, from_ns) = found.findings[0].correction(&flight.given_rig).expect("a fork that undoes it");
+    assert_eq!((changes.to_string().as_str(), from_ns, found.is_unexplained()), ("correct=focal:0.77", 0, false));
+    let several = with(Diagnosis { verdict: DiagnosisVerdict::Several, explaining: 2, ..one.clone() });
+    assert!(several.sentence.ends_with(": most likely the focal length is wrong, or cam0 zooms"), "{several:?}");
+    assert_eq!(several.named().len(), 2);
+    // What is stopped early is no cause.
+    let stopped = with(Diagnosis { interrupted: true, not_tried: vec![FaultKind::ImuNoise], ..one });
+    assert!(stopped.is_unexplained(), "{stopped:?}");
+    let open = "diagnosis: stopped; so far the focal length is wrong; not tried: imu noise";
+    assert_eq!(stopped.remedy, open);
 }
 
 #[test]

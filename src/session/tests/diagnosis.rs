@@ -6,10 +6,10 @@ use std::sync::Arc;
 use crate::faults::{Area, Fault, FaultKind, Severity, correct_joint_angles};
 use crate::log_check::{Finding, FindingInterval};
 use crate::sensors::Rig;
-use crate::session::diagnosis::{Diagnosis, DiagnosisVerdict, diagnose_run};
+use crate::session::diagnosis::diagnose_run;
 use crate::session::engine::{History, OwnedStepInput, RunEngine, estimator_config};
 use crate::session::plan::RunSpec;
-use crate::session::record::RunRecord;
+use crate::session::record::{Diagnosis, DiagnosisVerdict, RunRecord};
 use crate::session::tests::memory::{estimated_step, input_of};
 use crate::simulation::{SyntheticOptions, synthetic_tracks};
 
@@ -18,6 +18,17 @@ const LATER_NS: i64 = 3_500_000_000;
 
 /// Diagnosis of a flight whose rig and inputs have a fault; `measured` are the faults that the check of its log finds.
 fn diagnosed(
+    duration_s: f64,
+    rig_fault: impl Fn(&mut Rig),
+    input_fault: impl Fn(&mut OwnedStepInput, &Rig),
+    measured: &[Fault],
+) -> Diagnosis {
+    diagnosed_until(f64::INFINITY, duration_s, rig_fault, input_fault, measured)
+}
+
+/// The same, stopped when the progress exceeds a ratio.
+fn diagnosed_until(
+    stop_at: f64,
     duration_s: f64,
     rig_fault: impl Fn(&mut Rig),
     input_fault: impl Fn(&mut OwnedStepInput, &Rig),
@@ -42,7 +53,9 @@ fn diagnosed(
         record.push(estimated_step(&mut engine, &input));
     }
     let findings = || measured.iter().map(error_of).collect();
-    diagnose_run(&rig, &record, &history, &findings, &mut |_, _| ControlFlow::Continue(()))
+    diagnose_run(&rig, &record, &history, &findings, &mut |ratio, _| {
+        if ratio > stop_at { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    })
 }
 
 fn error_of(fault: &Fault) -> Finding {
@@ -116,6 +129,17 @@ fn an_offset_of_a_joint_is_named_with_its_time() {
     let found = diagnosed(5.0, |_| (), jump, &[Fault::from(FaultKind::JointReversed).of_joints(&["pitch".to_owned()])]);
     assert_jump(&found);
     assert!(!found.measured && found.headline().contains("by the trials"), "{found}");
+}
+
+#[test]
+fn a_diagnosis_that_is_stopped_says_what_is_open() {
+    let found = diagnosed_until(0.0, 5.0, |_| (), jump, &[]);
+    assert!(found.interrupted && found.trials == 0, "{found}");
+    assert_eq!(found.headline(), "stopped; so far no cause found; not tried: any cause");
+    let found = diagnosed_until(0.2, 5.0, |_| (), jump, &[]);
+    assert!(found.interrupted && found.trials > 0 && !found.not_tried.is_empty(), "{found}");
+    let headline = found.headline();
+    assert!(headline.starts_with("stopped; so far ") && headline.contains("; not tried: "), "{headline}");
 }
 
 #[test]

@@ -1,48 +1,53 @@
-//! Dialog "Diagnose": progress, the finding, and the causes, each with a fork that undoes it.
+//! Window of a diagnosis: progress, the finding, and the causes, each with a fork that undoes it.
 
 use std::time::Duration;
 
-use egui::{Button, Label, ProgressBar, RichText, ScrollArea, Ui};
+use egui::{Button, Id, Label, ProgressBar, RichText, ScrollArea, Ui};
 
-use super::modal::Modal;
 use crate::gui::PanelContext;
 use crate::gui::units::capitalized;
 use crate::session::{Command, Diagnosis, RankedCause};
 
-/// Period at which the dialog looks for progress.
+/// Place and width of the window in points at first.
+const DEFAULT_POSITION: [f32; 2] = [40.0, 120.0];
+const WIDTH: f32 = 560.0;
+/// Period at which the window looks for progress.
 const POLL_PERIOD: Duration = Duration::from_millis(100);
 /// Causes that are listed beside those that explain the residuals.
 const LISTED: usize = 4;
 
-/// Draws the dialog; starts the diagnosis of the shown run unless it is there. Returns true if the dialog stays open.
+/// Draws the window; starts the diagnosis of the shown run unless it is there. Returns true if the window stays open.
 pub(super) fn ui(ui: &Ui, ctx: &mut PanelContext<'_>) -> bool {
-    let theme = *ctx.theme;
     let number = ctx.run_number();
     let Some(run) = ctx.selected_run() else { return false };
-    let progress = ctx.playback.diagnosis.clone().filter(|progress| progress.run == run.id);
-    let title = format!("Diagnosis of {}", run.spec.label);
-    let modal = Modal { name: "diagnosis", title: &title, width: 560.0 };
-    let contents = modal.ui(ui, &theme, |ui| {
-        ui.add_space(4.0);
-        match progress.as_ref().map(|progress| (progress, &progress.result)) {
-            None => ctx.commands.push(Command::Diagnose { run: number }),
-            Some((_, Some(found))) => result_ui(ui, ctx, number, found),
-            Some((progress, None)) => {
+    let mut open = true;
+    let window = egui::Window::new(format!("Diagnosis of {}", run.spec.label))
+        .id(Id::unique("diagnosis"))
+        .open(&mut open)
+        .collapsible(false)
+        .default_pos(DEFAULT_POSITION)
+        .default_width(WIDTH);
+    let shown = window.show(ui.ctx(), |ui| {
+        ui.set_width(WIDTH);
+        match (&ctx.playback.diagnosis, &run.diagnosis) {
+            (Some(progress), _) if progress.run == run.id => {
                 ui.add(ProgressBar::new(progress.ratio as f32).show_percentage());
-                ui.label(RichText::new(&progress.label).monospace().color(theme.text_weak));
-                if ui.button("Stop").clicked() {
+                ui.label(RichText::new(&progress.label).monospace().color(ctx.theme.text_weak));
+                if ui.button("Stop diagnosis").clicked() {
                     ctx.commands.push(Command::StopDiagnosis);
                 }
             }
+            (_, Some(found)) => return result_ui(ui, ctx, number, found),
+            (_, None) => ctx.commands.push(Command::Diagnose { run: number }),
         }
-        if progress.as_ref().is_none_or(|progress| progress.result.is_none()) {
-            ui.ctx().request_repaint_after(POLL_PERIOD);
-        }
+        ui.ctx().request_repaint_after(POLL_PERIOD);
+        true
     });
-    contents.1
+    open && shown.and_then(|shown| shown.inner).unwrap_or(true)
 }
 
-fn result_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, run: usize, found: &Diagnosis) {
+/// Draws the result. Returns true if the window stays open.
+fn result_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, run: usize, found: &Diagnosis) -> bool {
     let theme = *ctx.theme;
     ui.add(Label::new(RichText::new(capitalized(&found.headline())).color(theme.text_strong)).wrap());
     for value in found.values.iter().filter(|value| !value.agrees()) {
@@ -57,31 +62,32 @@ fn result_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, run: usize, found: &Diagno
         ui.add(Label::new(format!("Ground truth {text}")).wrap());
     }
     ui.add_space(6.0);
+    let mut is_forked = false;
     ScrollArea::vertical().max_height(420.0).show(ui, |ui| {
         for (place, cause) in found.causes.iter().take(found.explaining.max(LISTED)).enumerate() {
-            cause_ui(ui, ctx, run, cause, place < found.explaining);
+            is_forked |= cause_ui(ui, ctx, run, cause, place < found.explaining);
         }
     });
     ui.add_space(6.0);
-    ui.horizontal(|ui| {
+    let is_closed = ui.horizontal(|ui| {
         if ui.button("Diagnose again").clicked() {
             ctx.commands.push(Command::Diagnose { run });
         }
-        if ui.button("Close").clicked() {
-            ui.close();
-        }
+        ui.button("Close").clicked()
     });
+    !is_forked && !is_closed.inner
 }
 
-/// Draws a cause with its remedy; its button forks the run with the change that undoes it.
-fn cause_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, run: usize, cause: &RankedCause, explains: bool) {
+/// Draws a cause with its remedy; its button forks the run with the change that undoes it. Returns true if it was clicked.
+fn cause_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, run: usize, cause: &RankedCause, explains: bool) -> bool {
     let theme = *ctx.theme;
+    let mut is_forked = false;
     ui.horizontal(|ui| {
         let hint = format!("Fork at {:.2} s: {}", cause.from_s, cause.changes);
         if ui.add(Button::new("Fork")).on_hover_text(hint).clicked() {
             ctx.commands.push(Command::Seek { stamp_ns: cause.from_ns });
             ctx.commands.push(Command::Fork { run, changes: cause.changes.clone(), label: None });
-            ui.close();
+            is_forked = true;
         }
         let color = if explains { theme.text_strong } else { theme.text_weak };
         ui.add(Label::new(RichText::new(capitalized(&cause.statement)).color(color)).wrap());
@@ -89,6 +95,7 @@ fn cause_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, run: usize, cause: &RankedC
     if explains {
         ui.add(Label::new(RichText::new(capitalized(&cause.remedy)).color(theme.text_weak)).wrap());
     }
+    is_forked
 }
 
 #[cfg(test)]
@@ -112,6 +119,7 @@ mod tests {
             changes,
             from_ns: 2 * SECOND_NS,
             from_s: 2.0,
+            since_ns: None,
             parameters: 1,
             beyond_search: false,
             gain: 8000.0,
@@ -143,6 +151,7 @@ mod tests {
             causes: vec![cause],
             trials: 40,
             interrupted: false,
+            not_tried: Vec::new(),
         }
     }
 
@@ -155,13 +164,16 @@ mod tests {
         let started = commands_of(&mut harness, |_| ());
         assert_eq!(started.first(), Some(&Command::Diagnose { run: 0 }));
         let run = harness.state().recording.runs[0].id;
-        let mut progress = DiagnosisProgress { run, ratio: 0.3, label: "correct=focal:0.7".to_owned(), result: None };
-        harness.state_mut().playback.diagnosis = Some(progress.clone());
-        harness.run_steps(3);
-        let stopped = commands_of(&mut harness, |harness| harness.get_by_label("Stop").click());
-        assert_eq!(stopped, [Command::StopDiagnosis]);
-        progress.result = Some(Arc::new(diagnosis()));
+        let progress = DiagnosisProgress { run, ratio: 0.3, label: "correct=focal:0.7".to_owned() };
         harness.state_mut().playback.diagnosis = Some(progress);
+        harness.run_steps(3);
+        // Bar and window have the progress; the window does not cover the bar.
+        for stop in ["Stop", "Stop diagnosis"] {
+            let stopped = commands_of(&mut harness, |harness| harness.get_by_label(stop).click());
+            assert_eq!(stopped, [Command::StopDiagnosis]);
+        }
+        harness.state_mut().playback.diagnosis = None;
+        harness.state_mut().recording.runs[0].diagnosis = Some(Arc::new(diagnosis()));
         harness.run_steps(3);
         assert!(harness.query_all_by_label("Joint 'yaw' counts in the other direction than in the rig").count() > 0);
         assert!(

@@ -1,4 +1,4 @@
-//! Modal dialogs; one is open at a time.
+//! Modal dialogs, one of which is open at a time, and the window of the diagnosis beside them.
 
 mod add_run;
 mod diagnosis;
@@ -47,8 +47,9 @@ pub(super) fn ui(ui: &Ui, dialogs: &mut Dialogs, ctx: &mut PanelContext<'_>, par
     if let Some(Picked::Paths(paths)) = picked {
         requests.push(WindowRequest::OpenLog(paths));
     }
+    dialogs.diagnosis_open = dialogs.diagnosis_open && diagnosis::ui(ui, ctx);
     let stays_open = match dialogs.open {
-        None => return,
+        None | Some(Dialog::Diagnosis) => return,
         Some(Dialog::OpenLog) => {
             let (path, stays_open) = dialogs.open_log.ui(ui, ctx.theme);
             requests.extend(path.map(|path| WindowRequest::OpenLog(vec![path])));
@@ -56,7 +57,6 @@ pub(super) fn ui(ui: &Ui, dialogs: &mut Dialogs, ctx: &mut PanelContext<'_>, par
         }
         Some(Dialog::AddRun) => dialogs.add_run.ui(ui, ctx),
         Some(Dialog::Fork) => dialogs.fork.ui(ui, ctx),
-        Some(Dialog::Diagnosis) => diagnosis::ui(ui, ctx),
         Some(Dialog::Markers) => dialogs.markers.ui(ui, ctx),
         Some(Dialog::Figure) => dialogs.figure.ui(ui, ctx, panels, requests),
         Some(Dialog::Palette) => dialogs.palette.ui(ui, ctx, tiles, actions),

@@ -17,6 +17,8 @@ pub struct Dialogs {
     pub(super) open: Option<Dialog>,
     /// True if the list of shortcuts is open.
     pub shortcuts_open: bool,
+    /// True if the window of the diagnosis is open, which is not modal.
+    pub(super) diagnosis_open: bool,
     pub(super) open_log: OpenLogDialog,
     pub(super) add_run: AddRunDialog,
     pub(super) fork: ForkDialog,
@@ -35,9 +37,13 @@ impl Dialogs {
         self.open_log = OpenLogDialog::new(desktop);
     }
 
-    /// Opens a dialog and closes the open one; the palette opens with an empty input.
+    /// Opens a dialog and closes the open one, except that the diagnosis is a window beside it; the palette opens with an empty input.
     pub fn show(&mut self, dialog: Dialog) {
         match dialog {
+            Dialog::Diagnosis => {
+                self.diagnosis_open = true;
+                return;
+            }
             Dialog::OpenLog => self.open_log.show_picker(),
             Dialog::Markers => self.markers = MarkersDialog::default(),
             Dialog::Palette => self.palette = CommandPalette::default(),
@@ -74,9 +80,9 @@ impl Dialogs {
         self.open.is_some()
     }
 
-    /// Closes the open dialog and the list of shortcuts.
+    /// Closes the open dialog, the list of shortcuts and the diagnosis.
     pub fn close(&mut self) {
         self.open = None;
-        self.shortcuts_open = false;
+        (self.shortcuts_open, self.diagnosis_open) = (false, false);
     }
 }

@@ -4,11 +4,12 @@ use std::fmt;
 
 use serde::{Serialize, Serializer};
 
+use super::truth_agreement::TruthAgreement;
+
 use crate::faults::{FaultKind, Severity};
-use crate::log_check::Finding;
+use crate::log_check::{Finding, MOST_LIKELY, joint_statement};
 use crate::session::misfit::AgreementValue;
 use crate::session::plan::ForkChanges;
-use crate::session::result::TruthAgreement;
 use crate::text::Named as _;
 
 /// Conclusion of a diagnosis.
@@ -45,6 +46,9 @@ pub struct RankedCause {
     #[serde(skip)]
     pub from_ns: i64,
     pub from_s: f64,
+    /// Stamp from which on the cause acts, in nanoseconds since the log began; `None` for the whole run.
+    #[serde(skip)]
+    pub since_ns: Option<i64>,
     /// Number of values that the cause takes from the recording.
     pub parameters: usize,
     /// True if the search has found no value of the cause: the value of `changes` is the best one of a coarse search.
@@ -59,6 +63,10 @@ pub struct RankedCause {
 
 fn key<S: Serializer>(cause: &FaultKind, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_str(cause.name())
+}
+
+fn keys<S: Serializer>(causes: &[FaultKind], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_seq(causes.iter().map(|cause| cause.name()))
 }
 
 fn text<S: Serializer>(changes: &ForkChanges, serializer: S) -> Result<S::Ok, S::Error> {
@@ -104,6 +112,9 @@ pub struct Diagnosis {
     pub trials: usize,
     /// True if it was interrupted before the last trial.
     pub interrupted: bool,
+    /// Keys of the causes that an interrupt left untried.
+    #[serde(serialize_with = "keys", skip_serializing_if = "Vec::is_empty")]
+    pub not_tried: Vec<FaultKind>,
 }
 
 /// Causes that a text lists beside those that explain the residuals.
@@ -149,7 +160,7 @@ impl fmt::Display for Diagnosis {
         }
         if let Some((from_s, to_s)) = self.span_s {
             let ended = if self.interrupted {
-                "; interrupted, other causes were not tried"
+                "; stopped early"
             } else if self.measured {
                 ", for the faults that the check measures"
             } else {
@@ -167,8 +178,28 @@ impl Diagnosis {
         Self { run, ..Self::default() }
     }
 
+    /// True if an interrupt left causes or refined values untried.
+    pub fn is_open(&self) -> bool {
+        self.interrupted && !matches!(self.verdict, DiagnosisVerdict::Agrees | DiagnosisVerdict::LogFault)
+    }
+
     /// The finding in one sentence: a fault that the check of the log measures precedes what the trials explain.
     pub fn headline(&self) -> String {
+        if !self.is_open() {
+            return self.headline_of_all();
+        }
+        let is_known = matches!(self.verdict, DiagnosisVerdict::Cause | DiagnosisVerdict::Several);
+        let known = if is_known { self.headline_of_all() } else { "no cause found".to_owned() };
+        let not_tried: Vec<String> = self.not_tried.iter().map(|cause| cause.name().replace('_', " ")).collect();
+        let open = match not_tried.as_slice() {
+            [] if self.trials == 0 => "any cause".to_owned(),
+            [] => "refined values".to_owned(),
+            causes => causes.join(", "),
+        };
+        format!("stopped; so far {known}; not tried: {open}")
+    }
+
+    fn headline_of_all(&self) -> String {
         let of_trials = self.headline_of_trials();
         if self.measured {
             return format!("{of_trials}, by the check of the log and by the trials");
@@ -194,7 +225,7 @@ impl Diagnosis {
             }
             DiagnosisVerdict::Agrees => "nothing to diagnose: the residuals agree with their noise".to_owned(),
             DiagnosisVerdict::Cause => first(),
-            DiagnosisVerdict::Several => format!("{} causes explain the residuals about as well", self.explaining),
+            DiagnosisVerdict::Several => self.alternatives(),
             DiagnosisVerdict::LogFault => "the log has a fault that no change of a run undoes".to_owned(),
             DiagnosisVerdict::Unexplained => {
                 "unexplained: no tried change brings the residuals back to their noise".to_owned()
@@ -204,8 +235,22 @@ impl Diagnosis {
     }
 }
 
+impl Diagnosis {
+    /// Causes that explain the residuals about equally well, in one sentence.
+    fn alternatives(&self) -> String {
+        let causes = self.causes.iter().take(self.explaining).map(RankedCause::as_alternative).collect::<Vec<_>>();
+        joint_statement(&causes.iter().map(String::as_str).collect::<Vec<_>>())
+    }
+}
+
 impl RankedCause {
-    fn text(&self) -> String {
+    /// Statement of a cause that is not the only one.
+    pub(in crate::session) fn as_alternative(&self) -> String {
+        format!("{MOST_LIKELY}{}", self.statement)
+    }
+
+    /// Agreement that the cause leaves.
+    pub(in crate::session) fn text(&self) -> String {
         let wrong: Vec<String> = self.values.iter().filter(|value| !value.agrees()).map(described).collect();
         let left = if wrong.is_empty() { "residuals agree".to_owned() } else { format!("left: {}", wrong.join(", ")) };
         self.accuracy.map_or_else(|| left.clone(), |accuracy| format!("{left}; {}", accuracy.text()))
