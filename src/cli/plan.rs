@@ -93,6 +93,8 @@ pub(crate) struct PlanArguments {
 pub(crate) enum Criterion {
     /// The largest ratio of σ to the prior's σ.
     Worst,
+    /// The largest ratio of σ to the required accuracy of the rig.
+    Required,
     /// The determinant of the covariance.
     Determinant,
 }
@@ -173,6 +175,7 @@ pub(crate) fn plan(arguments: &PlanArguments) -> Result<ExitOutcome> {
         parameterization: situation.chain.parameterization().to_string(),
         criterion: match arguments.criterion {
             Criterion::Worst => "worst",
+            Criterion::Required => "required",
             Criterion::Determinant => "determinant",
         },
         scene_m: arguments.distance.0.into(),
@@ -204,6 +207,7 @@ impl PlanArguments {
             duration_s: self.duration,
             criterion: match self.criterion {
                 Criterion::Worst => PlanCriterion::Worst,
+                Criterion::Required => PlanCriterion::Required,
                 Criterion::Determinant => PlanCriterion::Determinant,
             },
             parameters: self.chosen(situation)?,

@@ -11,7 +11,7 @@ use super::results::stage_results;
 use super::tables::{calibration_csv, frames_csv, information_csv, rank_csv};
 use super::trajectory::{covariance_csv, euroc_of_run, tum_of_run};
 use crate::files::output::OutputSet;
-use crate::session::{Recording, RunRecord, RunSummary, summarize};
+use crate::session::{Recording, RunRecord, RunSummary, summarize_with_motion};
 
 /// Trajectory as a table in EuRoC's format.
 const EUROC_TRAJECTORY: &str = "trajectory.euroc.csv";
@@ -63,7 +63,7 @@ pub(crate) fn stage_run(
 ) -> Result<(PathBuf, RunSummary), ExportError> {
     let folder = folder.join(&run.spec.label);
     fs::create_dir_all(&folder).map_err(ExportError::write(&folder))?;
-    let summary = summarize(recording, run, options.timing);
+    let summary = summarize_with_motion(recording, run, options.timing);
     let json = json_text(&summary, &folder.join("summary.json"))?;
     let mut rig = run.calibrated_rig(&recording.rig);
     let masks = masks::beside(&mut rig)?;

@@ -17,6 +17,7 @@ use crate::session::breakpoints::Breakpoints;
 use crate::session::{
     Answer, Command, DiagnosisProgress, FrameImage, Markers, Recording, RunRecord, SolverPosition, StepRecord,
 };
+use crate::simulation::PrescribedMotion;
 use crate::text::Named;
 
 /// One of the panels: it draws itself, and gives its values.
@@ -60,6 +61,8 @@ pub struct Selection {
     pub(crate) answers: Answers,
     /// Panel that the window shows from the next frame on.
     pub(crate) wanted_panel: Option<PanelName>,
+    /// Motion that the laboratory shows as the planned one from its next frame on.
+    pub(crate) planned: Option<PrescribedMotion>,
 }
 
 #[derive(Clone, Debug, PartialEq)]

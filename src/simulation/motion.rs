@@ -35,6 +35,9 @@ const ROUNDS: usize = 150;
 /// Shortest distance of the knots of a spline through samples, in seconds.
 const MIN_KNOT_S: f64 = 0.1;
 
+/// Time between two samples of a motion, in seconds.
+const SAMPLE_S: f64 = 0.02;
+
 impl MotionSplines {
     /// Vehicle at rest at the origin with heading zero and these joint angles, in `intervals` knot intervals.
     pub fn at_rest(joints_rad: &[f64], duration_s: f64, intervals: usize) -> Self {
@@ -146,6 +149,13 @@ impl MotionSplines {
             position_m: self.position_m(time_s, 0),
             heading_rad: self.heading_rad(time_s, 0),
         }
+    }
+
+    /// Samples of the motion every 0.02 s, for joints with these names.
+    pub fn prescribed(&self, joint_names: Vec<String>) -> PrescribedMotion {
+        let intervals = (self.duration_s() / SAMPLE_S).round().max(1.0);
+        let times_s = (0..=intervals as usize).map(|index| index as f64 / intervals * self.duration_s());
+        PrescribedMotion { joint_names, samples: times_s.map(|time_s| self.sample(time_s)).collect() }
     }
 
     /// Flight of the vehicle that begins at a position with a heading; it tilts as a multirotor to accelerate.

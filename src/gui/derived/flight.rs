@@ -10,9 +10,11 @@ use super::step_work::{REPAINT, StepWork};
 use crate::gimbal::ParameterId;
 use crate::gui::parameter_names::place_of;
 use crate::observability::Determination;
-use crate::observability::laboratory::Advice;
+use crate::observability::laboratory::{Advice, SufficientMotion};
 use crate::sensors::RequiredAccuracy;
-use crate::session::{Answer, FlightParameter, FlightVerdicts, Recording, RunRecord, StepRecord, Withheld};
+use crate::session::{
+    Answer, FlightParameter, FlightVerdicts, Recording, RunRecord, StepRecord, Withheld, motion_after,
+};
 
 /// Calibration tables of all runs; clones share them.
 #[derive(Clone, Debug, Default)]
@@ -37,6 +39,8 @@ pub(crate) struct FlightReport {
     pub(crate) history: Arc<DeterminationHistory>,
     /// True if motions for the chain are still being computed.
     pub(crate) waits_for_advice: bool,
+    /// Motion that brings the parameters to the required accuracy, of a trusted run that has ended without reaching it.
+    pub(crate) motion: Option<Arc<SufficientMotion>>,
 }
 
 /// Ratio of σ and required accuracy, and verdict of each parameter at each step.
@@ -67,6 +71,7 @@ struct FlightTable {
     /// Verdicts of all steps, not withheld.
     history: Arc<DeterminationHistory>,
     advice: StepWork<Arc<Advice>>,
+    motion: StepWork<Arc<SufficientMotion>>,
     /// True if `report` contains the motions of the last step's advice.
     advised: bool,
     report: FlightReport,
@@ -94,7 +99,8 @@ impl FlightTables {
         }
         let table = &mut runs[number];
         table.read(recording, run, answer.withheld(), self.in_background);
-        if table.report.waits_for_advice {
+        table.read_motion(recording, run, answer, self.in_background);
+        if table.report.waits_for_advice || table.motion.is_busy() {
             ctx.request_repaint_after(REPAINT);
         }
         table.report.clone()
@@ -112,7 +118,8 @@ impl FlightTable {
         let new_steps = self.follower.new_steps(run);
         let restarted = new_steps.restarted || is_other_scale;
         if restarted {
-            (self.verdicts, self.advice) = (FlightVerdicts::new(required.clone()), StepWork::default());
+            (self.advice, self.motion) = (StepWork::default(), StepWork::default());
+            self.verdicts = FlightVerdicts::new(required.clone());
             let epoch = self.history.epoch + 1;
             self.history = Arc::new(DeterminationHistory { epoch, ..DeterminationHistory::default() });
         }
@@ -155,6 +162,22 @@ impl FlightTable {
             self.advised = advised;
         }
         self.report.waits_for_advice = step.is_some() && !advised;
+    }
+}
+
+impl FlightTable {
+    /// Requests the motion that the parameters of a run still need when it has ended.
+    fn read_motion(&mut self, recording: &Recording, run: &RunRecord, answer: &Answer, in_background: bool) {
+        self.report.motion = None;
+        let needed = run.has_ended() && answer.needs_motion();
+        let Some(step) = self.verdicts.ranked_step().filter(|_| needed) else { return };
+        self.motion.request(step, "motion", in_background, || {
+            let (step, rig, camera) = (Arc::clone(step), Arc::clone(&recording.rig), run.camera_key.clone());
+            move || motion_after(&step, &rig, &camera).map(Arc::new)
+        });
+        if self.motion.has_result(step) {
+            self.report.motion = self.motion.last().and_then(|(_, motion)| motion).cloned();
+        }
     }
 }
 

@@ -84,6 +84,9 @@ impl CsvTable for LaboratoryPanel {
 
 impl Panel for LaboratoryPanel {
     fn ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>) {
+        if let Some(motion) = ctx.selection.planned.take() {
+            self.open_motion(motion);
+        }
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
             ui.spacing_mut().item_spacing.y = 3.0;
             if !ctx.presentation.is_figure() {

@@ -6,9 +6,10 @@ use egui::{Align, Button, Label, Layout as UiLayout, RichText, Ui};
 
 use super::actions::Action;
 use crate::gui::theme::{MAX_RUNS, Theme};
-use crate::gui::{Dialog, PanelContext, findings};
+use crate::gui::{Dialog, PanelContext, PanelName, findings};
 use crate::log_check::Trust;
-use crate::session::{Answer, Command, DiagnosisProgress, FindingSource, Recording, RunRecord};
+use crate::observability::laboratory::SufficientMotion;
+use crate::session::{Answer, Command, DiagnosisProgress, FindingSource, Recording, RunRecord, motion_text};
 
 /// Height of the bar in points.
 pub(super) const HEIGHT: f32 = 30.0;
@@ -32,6 +33,10 @@ pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, actions: &mut Vec<Acti
         if let Some(progress) = &ctx.playback.diagnosis {
             progress_ui(ui, ctx.commands, progress, &theme);
         }
+        let motion = ctx.flight(ui, run).motion.filter(|_| pending.is_none());
+        if let Some(motion) = &motion {
+            motion_ui(ui, ctx, motion);
+        }
         if pending.is_none() {
             buttons_ui(ui, ctx, &answer, actions);
         }
@@ -45,9 +50,9 @@ pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, actions: &mut Vec<Acti
             let sentence = RichText::new(format!("{of_run}{text}")).size(SENTENCE_SIZE);
             let label = ui.add(Label::new(sentence.color(color).strong()).truncate());
             label.on_hover_text(hover_text(&answer));
-            if pending.is_none() && !answer.remedy.is_empty() && ui.available_width() > LEAST_REMEDY_WIDTH {
-                let remedy = RichText::new(&answer.remedy).color(theme.text);
-                ui.add(Label::new(remedy).truncate()).on_hover_text(&answer.remedy);
+            let remedy = motion.map_or_else(|| answer.remedy.clone(), |it| motion_text(&it, &ctx.recording.rig));
+            if pending.is_none() && !remedy.is_empty() && ui.available_width() > LEAST_REMEDY_WIDTH {
+                ui.add(Label::new(RichText::new(&remedy).color(theme.text)).truncate()).on_hover_text(&remedy);
             }
         });
     });
@@ -74,6 +79,14 @@ fn progress_ui(ui: &mut Ui, commands: &mut Vec<Command>, progress: &DiagnosisPro
         ui.add(Label::new(RichText::new(&text).small().color(theme.text_weak)).truncate()).on_hover_text(&text);
     });
     ui.ctx().request_repaint_after(PROGRESS_PERIOD);
+}
+
+/// Draws the button that opens the motion which the parameters still need.
+fn motion_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, motion: &SufficientMotion) {
+    if ui.button("Open motion").on_hover_text("Show its curves and the predicted σ in the laboratory").clicked() {
+        ctx.selection.planned = Some(motion.motion.prescribed(ctx.recording.rig.joint_names()));
+        ctx.selection.wanted_panel = Some(PanelName::Laboratory);
+    }
 }
 
 /// Draws the buttons of the first finding, from right to left.
@@ -172,6 +185,24 @@ mod tests {
         let pushed = commands_of(&mut harness, |harness| harness.get_by_label(label).click());
         assert_eq!(pushed, [Command::Seek { stamp_ns: 2 * SECOND_NS }]);
         assert!(is_shown(&harness));
+    }
+
+    #[test]
+    fn a_motion_that_reaches_the_requirement_is_opened_with_one_click() {
+        let mut recording = sample();
+        recording.runs.truncate(1);
+        let mut harness = bench_of(recording, [1600.0, 900.0]);
+        assert!(harness.query_all_by_label_contains("Fly ").next().is_some());
+        harness.get_by_label("Open motion").click();
+        harness.run_steps(4);
+        assert!(harness.state().window.tiles.layout.is_visible(PanelName::Laboratory));
+        assert!(harness.state().selection.planned.is_none(), "the laboratory has taken it");
+        assert!(harness.query_by_label("Save motion").is_some(), "the planned motion is shown");
+        // With a requirement that the run reaches, nothing is asked for.
+        let mut recording = sample();
+        let required = &mut Arc::make_mut(&mut recording.rig).required_accuracy;
+        (required.translation_m, required.rotation_rad) = (10.0, 10.0);
+        assert!(bench_of(recording, [1600.0, 900.0]).query_by_label("Open motion").is_none());
     }
 
     #[test]

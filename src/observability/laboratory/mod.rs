@@ -33,8 +33,8 @@ pub use motion::{LaboratoryMotion, UnknownMotion};
 pub use planning::{
     EnteredLimits, HandPlan, HandStep, ListedComparison, MotionLimits, MotionPlan, MotionPlanError, MotionPrediction,
     MotionPredictor, MotionProblem, MotionStart, PLAN_DURATION_S, PLAN_KNOT_S, PLAN_SECONDS, PlanCriterion,
-    PlanOptions, PlanStart, PlanTable, PlannedParameter, PlannedRow, ReachedLimit, SCENE_M, SigmaRow, move_point,
-    plan_by_hand, plan_motion, scene_distances_m,
+    PlanOptions, PlanStart, PlanTable, PlannedParameter, PlannedRow, ReachedLimit, SCENE_M, SigmaRow, SufficientMotion,
+    move_point, plan_by_hand, plan_motion, scene_distances_m, sufficient_motion,
 };
 pub use report::LaboratoryReport;
 pub use sensor_columns::{SensorColumns, UnknownColumns};

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use serde::{Serialize, Serializer};
 
 use super::answer::Answer;
+use super::motion::{motion_after, motion_text};
 use super::withheld::flight_table;
 use crate::calibration::ChainDistance;
 use crate::estimator::{Phase, Stage, StageTimes};
@@ -159,6 +160,17 @@ pub struct RunSummary {
 
 fn lanes<S: Serializer>(lanes: &[Arc<TrajectoryLane>], serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_seq(lanes.iter().map(Arc::as_ref))
+}
+
+/// Summary of a run with the motion that its parameters still need, which takes some tenths of a second.
+pub fn summarize_with_motion(recording: &Recording, run: &RunRecord, timing: bool) -> RunSummary {
+    let mut summary = summarize(recording, run, timing);
+    let step = run.steps.iter().rev().find(|step| step.rank.is_some());
+    if let Some(step) = step.filter(|_| summary.answer.needs_motion()) {
+        let motion = motion_after(step, &recording.rig, &run.camera_key);
+        summary.answer.remedy = motion.map_or_else(String::new, |motion| motion_text(&motion, &recording.rig));
+    }
+    summary
 }
 
 pub fn summarize(recording: &Recording, run: &RunRecord, timing: bool) -> RunSummary {

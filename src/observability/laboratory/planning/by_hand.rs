@@ -42,7 +42,12 @@ pub struct HandStep {
 }
 
 /// Chooses the move of each window that lowers the criterion most after those before; every move starts and ends at rest.
-pub(super) fn choose(problem: &SearchProblem<'_>, duration_s: f64) -> Vec<HandMove> {
+/// After the first move whose information `is_enough`, no further one is chosen.
+pub(super) fn choose(
+    problem: &SearchProblem<'_>,
+    duration_s: f64,
+    is_enough: &dyn Fn(&DMatrix<f64>) -> bool,
+) -> Vec<HandMove> {
     let &SearchProblem { situation, objective, ref layout, .. } = problem;
     let columns = situation.information.ncols();
     let candidates = combined(problem, layout.length_s);
@@ -61,15 +66,18 @@ pub(super) fn choose(problem: &SearchProblem<'_>, duration_s: f64) -> Vec<HandMo
         let Some((_, best, rows)) = evaluated.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)) else { break };
         chosen.push(best);
         windows.push(rows);
+        if is_enough(&joined(&windows, columns)) {
+            break;
+        }
     }
     chosen
 }
 
 impl HandPlan {
-    pub(super) fn new(problem: &SearchProblem<'_>, duration_s: f64) -> Option<Self> {
+    /// Plan of given moves, one for each window; `None` when a number is not finite.
+    pub(super) fn of_moves(problem: &SearchProblem<'_>, duration_s: f64, moves: &[HandMove]) -> Option<Self> {
         let &SearchProblem { situation, objective, ref layout, .. } = problem;
-        let moves = choose(problem, duration_s);
-        let flown = problem.evaluate(starts::as_described(problem, duration_s, &moves))?;
+        let flown = problem.evaluate(starts::as_described(problem, duration_s, moves))?;
         let mut steps = Vec::new();
         let columns = situation.information.ncols();
         let start = PlanTable::new(situation, objective, &DMatrix::zeros(columns, columns))?;

@@ -15,6 +15,7 @@ mod planned_row;
 mod problem;
 mod search;
 mod starts;
+mod sufficient;
 mod summary;
 #[cfg(test)]
 mod tests;
@@ -31,5 +32,6 @@ pub use planned_row::PlannedRow;
 pub use problem::{MotionPrediction, MotionPredictor, MotionProblem, MotionStart};
 pub use search::move_point;
 pub use starts::PLAN_KNOT_S;
+pub use sufficient::{SufficientMotion, sufficient_motion};
 pub use summary::{PlanTable, PlannedParameter, SigmaRow};
 pub use windows::{SCENE_M, scene_distances_m};

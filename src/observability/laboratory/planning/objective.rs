@@ -12,6 +12,8 @@ use crate::observability::flight_sigmas::sigmas_without_prior;
 pub enum PlanCriterion {
     /// Largest ratio of σ to the prior's σ among the parameters.
     Worst,
+    /// Largest ratio of σ to the required accuracy among the parameters.
+    Required,
     /// Determinant of the covariance of the parameters.
     Determinant,
 }
@@ -40,6 +42,8 @@ pub(super) struct Objective {
     start: DMatrix<f64>,
     /// Prior σ of every column within these directions, in column units.
     prior_sigmas: Vec<f64>,
+    /// σ of every column that counts as 1 in a ratio, in column units: of the prior, or required.
+    scales: Vec<f64>,
     /// Columns of the criterion.
     columns: Vec<usize>,
     /// Logarithm of the determinant of the prior covariance of these columns.
@@ -59,6 +63,7 @@ impl Objective {
             prior: start.clone(),
             start,
             prior_sigmas: Vec::new(),
+            scales: Vec::new(),
             columns: Vec::new(),
             prior_log_determinant: 0.0,
         };
@@ -66,9 +71,17 @@ impl Objective {
         let covariance = objective.covariance(&nothing)?;
         objective.prior_sigmas = sigmas_of(&covariance);
         let parameters = situation.chain.parameters();
-        let matters = |column: &usize| {
-            objective.prior_sigmas[*column] > REDUNDANT && (chosen.is_empty() || chosen.contains(&parameters[*column]))
+        let required = || parameters.iter().map(|parameter| situation.required.of(*parameter) / parameter.scale());
+        objective.scales = match criterion {
+            PlanCriterion::Required => required().collect(),
+            PlanCriterion::Worst | PlanCriterion::Determinant => objective.prior_sigmas.clone(),
         };
+        let is_left_out = |column: usize| match criterion {
+            PlanCriterion::Required => objective.is_redundant(column),
+            PlanCriterion::Worst | PlanCriterion::Determinant => objective.prior_sigmas[column] <= REDUNDANT,
+        };
+        let matters =
+            |column: &usize| !is_left_out(*column) && (chosen.is_empty() || chosen.contains(&parameters[*column]));
         objective.columns = (0..parameters.len()).filter(matters).collect();
         objective.prior_log_determinant = objective.log_determinant(&covariance).unwrap_or(0.0);
         (!objective.columns.is_empty()).then_some(objective)
@@ -114,17 +127,19 @@ impl Objective {
         Some(sigmas_without_prior(&factor?, &prior?, &self.excitable))
     }
 
-    /// Ratios of σ to the prior's σ of the columns of the criterion, with their columns.
+    /// Ratios of σ to the prior's σ or to the required one, of the columns of the criterion, with their columns.
     pub(super) fn ratios(&self, gained: &DMatrix<f64>) -> Option<Vec<(usize, f64)>> {
         let covariance = self.covariance(gained)?;
-        let ratio = |column: usize| covariance[(column, column)].max(0.0).sqrt() / self.prior_sigmas[column];
+        let ratio = |column: usize| covariance[(column, column)].max(0.0).sqrt() / self.scales[column];
         Some(self.columns.iter().map(|column| (*column, ratio(*column))).collect())
     }
 
-    /// The criterion: 1 without information.
+    /// The criterion; without information 1, unless it compares with the required accuracy.
     pub(super) fn value(&self, gained: &DMatrix<f64>) -> Option<f64> {
         match self.criterion {
-            PlanCriterion::Worst => self.ratios(gained).map(|ratios| ratios.iter().map(|it| it.1).fold(0.0, f64::max)),
+            PlanCriterion::Worst | PlanCriterion::Required => {
+                self.ratios(gained).map(|ratios| ratios.iter().map(|it| it.1).fold(0.0, f64::max))
+            }
             PlanCriterion::Determinant => self.mean_ratio_of_determinant(gained),
         }
     }
@@ -132,7 +147,7 @@ impl Objective {
     /// Value that the search minimizes, smooth for the largest ratio.
     pub(super) fn search_value(&self, gained: &DMatrix<f64>) -> Option<f64> {
         match self.criterion {
-            PlanCriterion::Worst => {
+            PlanCriterion::Worst | PlanCriterion::Required => {
                 let ratios = self.ratios(gained)?;
                 let sum: f64 = ratios.iter().map(|(_, ratio)| ratio.powi(EXPONENT)).sum();
                 Some((sum / ratios.len() as f64).powf(1.0 / f64::from(EXPONENT)))

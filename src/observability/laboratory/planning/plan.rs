@@ -107,7 +107,8 @@ pub struct MotionPlan {
 pub fn plan_by_hand(situation: &Situation, options: &PlanOptions) -> Result<HandPlan, MotionPlanError> {
     let (objective, layout) = problem(situation, options)?;
     let problem = SearchProblem { situation, objective: &objective, limits: &options.limits, layout };
-    HandPlan::new(&problem, options.duration_s).ok_or(MotionPlanError::NotFinite)
+    let moves = choose(&problem, options.duration_s, &|_| false);
+    HandPlan::of_moves(&problem, options.duration_s, &moves).ok_or(MotionPlanError::NotFinite)
 }
 
 /// Searches the motion with the smallest criterion within the limits.
@@ -197,7 +198,7 @@ fn begin(coarse: &SearchProblem<'_>, options: &PlanOptions, repeated: &[Repeated
     let best = best_of(coarse.objective, repeated);
     let motion = |index: usize| match (index, best) {
         (0, _) => {
-            let moves = choose(coarse, options.duration_s);
+            let moves = choose(coarse, options.duration_s, &|_| false);
             let motion = starts::of_moves(coarse, options.duration_s, &moves);
             ("best moves in turn".to_owned(), motion)
         }

@@ -100,7 +100,7 @@ impl MotionProblem {
             MotionStart::Waves => starts::random(situation, limits, duration_s, &mut SplitMix64::new(SEED)),
             MotionStart::Moves => {
                 let coarse = SearchProblem { layout: WindowLayout::coarse(duration_s), ..self.search(limits) };
-                starts::of_moves(&coarse, duration_s, &choose(&coarse, duration_s))
+                starts::of_moves(&coarse, duration_s, &choose(&coarse, duration_s, &|_| false))
             }
         };
         self.search(limits).within_limits(motion)

@@ -10,13 +10,14 @@ use super::search::SearchProblem;
 use super::windows::{WindowLayout, WindowRows, joined, rows_of_interval, rows_of_keyframes, trajectory};
 use super::{
     EnteredLimits, MotionLimits, MotionPlan, MotionPlanError, MotionPredictor, MotionProblem, MotionStart,
-    PlanCriterion, PlanOptions, move_point, plan_by_hand, plan_motion, starts,
+    PlanCriterion, PlanOptions, SufficientMotion, move_point, plan_by_hand, plan_motion, starts, sufficient_motion,
 };
 use crate::camera::CameraModel;
 use crate::estimator::EstimatorConfig;
 use crate::geometry::SplitMix64;
 use crate::gimbal::Parameterization;
 use crate::observability::Determination;
+use crate::sensors::RequiredAccuracy;
 use crate::simulation::{MotionSplines, SyntheticOptions, synthetic_tracks};
 
 /// Situation before a flight with a named mechanism, a prior of 3 cm and 10°, and encoders of this σ.
@@ -292,4 +293,32 @@ fn parameters_that_a_parameterization_has_twice_are_called_redundant() {
     let (redundant, open) = verdicts(Parameterization::Classical);
     assert!(redundant >= 6 && open > 0, "{redundant} redundant, {open} not determined");
     assert_eq!(verdicts(Parameterization::Minimal).0, 0);
+}
+
+#[test]
+fn moves_end_when_every_parameter_is_as_accurate_as_required() {
+    let situation = |translation_m: f64, rotation_deg: f64| Situation {
+        required: RequiredAccuracy {
+            translation_m,
+            rotation_rad: rotation_deg.to_radians(),
+            ..RequiredAccuracy::default()
+        },
+        ..situation("yaw-roll-pitch-offset", Some(0.5_f64.to_radians()))
+    };
+    let of = |situation: &Situation| sufficient_motion(situation, &EnteredLimits::SLOW.around(situation));
+    assert_eq!(of(&situation(1.0, 90.0)), None, "the prior is enough");
+    let loose = of(&situation(0.02, 1.0)).expect("a motion");
+    assert_eq!(loose.remaining, None, "{loose:?}");
+    let strict = of(&situation(0.01, 0.4)).expect("a motion");
+    let hopeless = situation(1e-6, 1e-4);
+    let longest = of(&hopeless).expect("a motion");
+    let durations_s = [&loose, &strict, &longest].map(SufficientMotion::duration_s);
+    assert!(durations_s.is_sorted() && durations_s[0] < durations_s[2], "{durations_s:?}");
+    assert_eq!(durations_s[2], 40.0);
+    for motion in [&loose, &strict, &longest] {
+        let sum: f64 = motion.moves.iter().map(|(_, duration_s)| duration_s).sum();
+        assert!(sum <= motion.duration_s() + 1e-9 && motion.moves.windows(2).all(|two| two[0].0 != two[1].0));
+    }
+    let (worst, sigma) = longest.remaining.expect("one micrometre is too little");
+    assert!(sigma > hopeless.required.of(worst), "{worst:?}: {sigma}");
 }
