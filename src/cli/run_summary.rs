@@ -54,6 +54,12 @@ pub(crate) fn describe(folder: &Path, summary: &RunSummary) -> String {
             calibration.parameterization
         ));
     }
+    if calibration.sigma_scale > 1.0 {
+        lines.push(format!(
+            "  σ            × {:.2}: the estimates have changed more than their σ allow\n",
+            calibration.sigma_scale
+        ));
+    }
     lines.extend(verdict_lines(&calibration.estimability));
     if let Some(rank) = &summary.rank {
         lines.push(format!(

@@ -9,12 +9,13 @@ use crate::sensors::Rig;
 use crate::session::{RunRecord, StepRecord};
 use crate::table::{Column, Stamp, csv};
 
-/// `calibration.csv`: each parameter and its σ, then the joint angles. A switch of the parameterization changes the
+/// `calibration.csv`: each parameter and its σ, then the joint angles and the factor in σ. A switch of the parameterization changes the
 /// parameters: there are columns for all parameterizations of the run, empty while another one is in use.
 pub(super) fn calibration_csv(run: &RunRecord, rig: &Rig) -> String {
     let mut columns = vec![StepRecord::stamp_column()];
     columns.extend(run.parameter_columns(rig).flat_map(|(_, columns)| columns));
     columns.extend(run.joint_columns(rig));
+    columns.push(Column::new("sigma_scale", |step: &StepRecord| step.report.calibration.sigma_scale));
     let estimated = run.steps.iter().filter(|step| step.report.newest().is_some());
     csv(&columns, estimated.map(Arc::as_ref))
 }

@@ -110,6 +110,7 @@ pub(super) fn calibration(runs: &[RunContent]) -> Option<Markup> {
                     tr {
                         th colspan=(columns.len()) scope="rowgroup" {
                             "Calibration of run " (run.label) ", parameterization " (run.summary.calibration.parameterization)
+                            ", σ × " (Page.fixed(run.summary.calibration.sigma_scale, 2)) " by its consistency"
                         }
                     }
                 }

@@ -69,6 +69,9 @@ pub struct CalibrationEstimate {
     pub values: Vec<f64>,
     /// Posterior standard deviations (NaN before the first solve).
     pub sigmas: Vec<f64>,
+    /// Factor by which the standard deviations of the measurements were multiplied in `sigmas`; the estimator gives 1, a
+    /// session the factor by which the estimates of the run have changed more than their standard deviations allow.
+    pub sigma_scale: f64,
     /// Standard deviations of the rig's prior.
     pub prior_sigmas: Vec<f64>,
     /// Complete chain in the classical parameterization.

@@ -223,6 +223,7 @@ pub(crate) fn calibration_estimate(setup: &Setup, calibration: &Calibrations, si
         parameters,
         values: calibration.values(),
         sigmas,
+        sigma_scale: 1.0,
         prior_sigmas: calibration.prior_sigmas(),
         classical: chain.to_classical(),
         margins: chain.margins(),

@@ -92,7 +92,12 @@ impl CalibrationPanel {
             }
             ui.label(RichText::new(span_text(ctx.recording, run)).color(ctx.theme.text_weak));
             let headline = RichText::new(flight_headline(&report.rows)).color(ctx.theme.text_strong);
-            ui.label(headline).on_hover_text(rule(ctx, &report.rows));
+            let scale = report.rows.first().map_or(1.0, |row| row.sigma_scale);
+            let measured = format!(
+                "σ is multiplied by {}: the factor by which the estimates of this run have changed more than their σ allow.",
+                fixed(scale, 2)
+            );
+            ui.label(headline).on_hover_text(format!("{}\n{measured}", rule(ctx, &report.rows)));
             if !ctx.presentation.is_figure() {
                 self.required_ui(ui, ctx);
                 let field = TextEdit::singleline(&mut self.filter).hint_text("Filter").desired_width(FILTER_WIDTH);

@@ -49,6 +49,11 @@ impl CsvTable for ConvergencePanel {
             columns.extend(estimate);
             columns
                 .push(StepColumn::new(format!("{name}_truth_{}", parameter.dimension().unit()), move |_| ground_truth));
+            columns.push(StepColumn::new(format!("{name}_error_in_sigmas"), move |step: &StepRecord| {
+                let calibration = &step.report.calibration;
+                let sigma = calibration.sigma_of(parameter).filter(|sigma| *sigma > 0.0)?;
+                Some(parameter.dimension().difference(calibration.value_of(parameter)?, ground_truth?) / sigma)
+            }));
         }
         let estimated = run.steps.iter().filter(|step| step.report.newest().is_some());
         csv(&columns, estimated.map(std::sync::Arc::as_ref))

@@ -13,7 +13,7 @@ use crate::observability::Determination;
 use crate::observability::laboratory::{Advice, SufficientMotion};
 use crate::sensors::RequiredAccuracy;
 use crate::session::{
-    Answer, FlightParameter, FlightVerdicts, Recording, RunRecord, StepRecord, Withheld, motion_after,
+    Answer, FlightParameter, FlightVerdicts, Recording, RunRecord, StepRecord, Withheld, add_errors, motion_after,
 };
 
 /// Calibration tables of all runs; clones share them.
@@ -155,6 +155,7 @@ impl FlightTable {
         if changed || advised != self.advised {
             let advice = self.advice.last().and_then(|(_, advice)| advice).filter(|_| advised).map(|advice| &**advice);
             let mut rows = self.verdicts.table(&recording.rig.parameter_names(), advice);
+            add_errors(&mut rows, recording, run);
             if let Some(withheld) = &self.withheld {
                 withheld.apply(&mut rows);
             }

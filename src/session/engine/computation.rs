@@ -127,7 +127,11 @@ impl Computation {
                     Detail::SolverStates(shown) => shown,
                     Detail::Step | Detail::FactorRows => SolverPosition::BeforeLast(0),
                 };
-                let records: Vec<_> = records.into_iter().map(Arc::new).collect();
+                let scaled = records.into_iter().map(|mut record| {
+                    run.scale_as(request.step, &mut record);
+                    Arc::new(record)
+                });
+                let records: Vec<_> = scaled.collect();
                 let at = shown.of(records.len().saturating_sub(1));
                 run.trace = Some(SolverTrace { step: request.step, records, at });
             }

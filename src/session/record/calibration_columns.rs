@@ -15,6 +15,9 @@ pub struct CalibrationRow<'a> {
     pub waits_for_advice: bool,
 }
 
+/// Error in standard deviations that is marked.
+const FAR_ERROR: f64 = 3.0;
+
 type CalibrationColumn<'a> = Column<'a, CalibrationRow<'a>>;
 
 impl<'a> CalibrationRow<'a> {
@@ -30,10 +33,15 @@ impl<'a> CalibrationRow<'a> {
                 .text(|row, _| row.summary.map_or_else(String::new, |summary| row.on_page(summary.initial)))
                 .on_page("rig"),
             CalibrationColumn::new("value", |row| row.flight.value)
-                .means("", "Estimate at the end of the flight and its posterior standard deviation")
+                .means(
+                    "",
+                    "Estimate at the end of the flight and its posterior standard deviation, multiplied by the factor by \
+                     which the estimates of the run have changed more than their σ allow (at least 1)",
+                )
                 .text(Self::value_text)
                 .headings("Value ± 1 σ", "final ± 1 σ"),
             CalibrationColumn::new("sigma", |row| row.flight.sigma),
+            CalibrationColumn::new("sigma_scale", |row| row.flight.sigma_scale),
             CalibrationColumn::new("prior_sigma", |row| row.flight.prior_sigma),
             CalibrationColumn::new("ratio", |row| row.flight.ratio)
                 .means("", "1: the flight adds nothing; 0.5: three quarters of the information come from it")
@@ -57,10 +65,21 @@ impl<'a> CalibrationRow<'a> {
                 .text(Self::since_text)
                 .tone(|_| Tone::Accent)
                 .headings("Since", "since, s"),
-            CalibrationColumn::shown(|row| row.summary?.error)
+            CalibrationColumn::new("error", |row| row.flight.error)
                 .text(|row, _| row.error_text())
                 .optional()
                 .on_page("error (multiple of σ)"),
+            CalibrationColumn::new("error_in_sigmas", |row| row.flight.error_in_sigmas())
+                .means("σ", "Error of the value against the ground truth, in units of its σ")
+                .text(|row, medium| {
+                    row.flight.error_in_sigmas().map_or_else(String::new, |error| medium.fixed(error, 1))
+                })
+                .tone(|row| match row.flight.error_in_sigmas() {
+                    Some(error) if error.abs() > FAR_ERROR => Tone::Bad,
+                    _ => Tone::Weak,
+                })
+                .optional()
+                .on_screen("Error / σ"),
             CalibrationColumn::new("cause", |row| row.flight.cause.map_or("", |cause| cause.name())),
             CalibrationColumn::new("reason", |row| row.flight.reason.as_str())
                 .means(
@@ -106,8 +125,8 @@ impl<'a> CalibrationRow<'a> {
     }
 
     fn error_text(&self) -> String {
-        let Some(error) = self.summary.and_then(|summary| summary.error) else { return String::new() };
-        let ratio = self.flight.sigma.filter(|sigma| *sigma > 0.0).map(|sigma| (error / sigma).abs());
+        let Some(error) = self.flight.error else { return String::new() };
+        let ratio = self.flight.error_in_sigmas().map(f64::abs);
         let ratio = ratio.map_or_else(String::new, |ratio| format!(" ({} σ)", Medium::Page.fixed(ratio, 1)));
         format!("{}{}{ratio}", self.on_page(error), Shown::of(self.flight.dimension).unit)
     }
@@ -147,6 +166,8 @@ mod tests {
                 prior_sigma: Some(0.25),
                 ratio: Some(0.5),
                 flight_sigma: None,
+                sigma_scale: 1.0,
+                error,
                 required: 0.0625,
                 verdict: Determination::WeaklyDetermined,
                 since_ns: Some(1_500_000_000),
@@ -162,7 +183,7 @@ mod tests {
             };
             let [rig, last, error] = expected;
             assert_eq!(cells(Some(&summary)), ["parameter", rig, last, "0.500", "weakly determined", "1.50", error]);
-            assert_eq!(cells(None).len(), 6);
+            assert_eq!(cells(None).len(), 7);
         };
         check(Dimension::Angle, ["0.000", "14.324 ± 7.162°", "−14.324° (2.0 σ)"]);
         check(Dimension::Length, ["0.00", "250.00 ± 125.00 mm", "−250.00 mm (2.0 σ)"]);

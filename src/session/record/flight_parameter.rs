@@ -27,6 +27,12 @@ pub struct FlightParameter {
     pub ratio: Option<f64>,
     /// Standard deviation by the measurements of the flight alone; `None` where the prior alone determines the value.
     pub flight_sigma: Option<f64>,
+    /// Factor on the standard deviations of the measurements; see [`CalibrationEstimate`](crate::estimator::CalibrationEstimate).
+    #[serde(skip)]
+    pub sigma_scale: f64,
+    /// Value minus ground-truth value.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error: Option<f64>,
     /// Required accuracy in the unit of the value.
     pub required: f64,
     pub verdict: Determination,
@@ -75,6 +81,12 @@ impl FlightParameter {
     /// Stamp from which the verdict holds, in seconds since the log began.
     pub fn since_s(&self) -> Option<f64> {
         self.since_ns.map(seconds_from_ns)
+    }
+
+    /// Error against the ground truth in standard deviations.
+    pub fn error_in_sigmas(&self) -> Option<f64> {
+        let sigma = self.sigma.filter(|sigma| *sigma > 0.0)?;
+        Some(self.error? / sigma)
     }
 
     /// Posterior standard deviation divided by the required accuracy.

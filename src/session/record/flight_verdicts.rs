@@ -148,7 +148,11 @@ impl FlightVerdicts {
                 sigma,
                 prior_sigma,
                 ratio: sigma.zip(prior_sigma).map(|(sigma, prior_sigma)| sigma / prior_sigma),
-                flight_sigma: ranked.map(|rank| rank.flight_sigma(*parameter)).filter(|sigma| sigma.is_finite()),
+                flight_sigma: ranked
+                    .map(|rank| calibration.sigma_scale * rank.flight_sigma(*parameter))
+                    .filter(|sigma| sigma.is_finite()),
+                sigma_scale: calibration.sigma_scale,
+                error: None,
                 required,
                 verdict: followed.verdict,
                 since_ns: (followed.verdict != Determination::Initializing).then_some(followed.since_ns),
@@ -188,7 +192,8 @@ impl StepRecord {
             |parameter: &ParameterId| self.rank.as_ref().is_some_and(|rank| rank.fixed_parameters.contains(parameter));
         let verdict = |(index, parameter): (usize, &ParameterId)| {
             let sigma = calibration.sigmas.get(index).copied().unwrap_or(f64::NAN);
-            let flight_sigma = rank.map_or(f64::INFINITY, |rank| rank.flight_sigma(*parameter));
+            let flight_sigma =
+                rank.map_or(f64::INFINITY, |rank| calibration.sigma_scale * rank.flight_sigma(*parameter));
             let verdict = if fixed(parameter) {
                 Determination::Fixed
             } else {
@@ -254,17 +259,35 @@ pub(in crate::session) fn flight_rows(recording: &Recording, run: &RunRecord) ->
     let improvable = verdicts.verdicts().any(|(_, verdict)| verdict.is_improvable());
     let ranked = verdicts.ranked_step().filter(|_| improvable);
     let advice = ranked.and_then(|step| flight_advice(step, &recording.rig, &run.camera_key));
-    verdicts.table(&recording.rig.parameter_names(), advice.as_ref())
+    let mut rows = verdicts.table(&recording.rig.parameter_names(), advice.as_ref());
+    add_errors(&mut rows, recording, run);
+    rows
 }
 
-/// Number of parameters by verdict: `18 parameters: 13 determined, 5 weakly determined`.
+/// Enters the errors of the last step against the ground truth, where it is known.
+pub fn add_errors(rows: &mut [FlightParameter], recording: &Recording, run: &RunRecord) {
+    let (Some(truth), Some(last)) = (&recording.ground_truth_rig, run.steps.last()) else { return };
+    let values = run.values_in(truth, &recording.rig, &last.report.calibration).unwrap_or_default();
+    for row in rows {
+        let true_value = values.iter().find(|(parameter, _)| *parameter == row.parameter);
+        row.error = true_value.map(|(_, value)| row.dimension.difference(row.value, *value));
+    }
+}
+
+/// For example `; σ × 1.35`: the factor on standard deviations; empty without one.
+fn scale_text(rows: &[FlightParameter]) -> String {
+    let scale = rows.first().map_or(1.0, |row| row.sigma_scale);
+    if scale > 1.0 { format!("; σ × {scale:.2}") } else { String::new() }
+}
+
+/// Number of parameters by verdict: `18 parameters: 13 determined, 5 weakly determined; σ × 1.35`.
 pub fn flight_headline(rows: &[FlightParameter]) -> String {
     let counted = Determination::all().filter_map(|verdict| {
         let count = rows.iter().filter(|row| row.verdict == verdict).count();
         (count > 0).then(|| format!("{count} {}", verdict.name()))
     });
     let noun = if rows.len() == 1 { "parameter" } else { "parameters" };
-    format!("{} {noun}: {}", rows.len(), counted.collect::<Vec<_>>().join(", "))
+    format!("{} {noun}: {}{}", rows.len(), counted.collect::<Vec<_>>().join(", "), scale_text(rows))
 }
 
 /// Parameter with the largest ratio of σ and required accuracy among those that another flight could improve.

@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use super::antenna_record::{AntennaRecord, PositionTruth};
 use super::diagnosis::Diagnosis;
 use super::image_residuals::ImageResiduals;
+use super::sigma_scale::{SigmaScale, scale_sigmas};
 use super::solver_trace::SolverTrace;
 use super::step::{RunWarning, StepFactorRows, StepRecord, add_warnings, warnings_of};
 use super::summary::SummaryOrder;
@@ -84,6 +85,8 @@ pub struct RunRecord {
     pub(in crate::session) misfits: Vec<StepMisfit>,
     /// Result of the last diagnosis; `None` without one.
     pub diagnosis: Option<Arc<Diagnosis>>,
+    /// Scale of the standard deviations of the calibration, from the steps so far.
+    sigma_scale: SigmaScale,
     /// Residuals of every image in the step of that image, by place in the image.
     pub image_residuals: ImageResiduals,
     /// Warnings of its steps, each message once.
@@ -120,6 +123,7 @@ impl RunRecord {
             antenna: AntennaRecord::default(),
             misfits: Vec::new(),
             diagnosis: None,
+            sigma_scale: SigmaScale::default(),
             image_residuals: ImageResiduals::default(),
             warnings: Vec::new(),
             memory: RunMemory::default(),
@@ -153,6 +157,7 @@ impl RunRecord {
         // The parent counts the bytes of the shared steps; tracks are counted once for all runs.
         fork.memory.tracks = fork.steps.iter().map(|step| step.tracks_bytes()).sum();
         fork.warnings = warnings_of(&fork.steps);
+        fork.sigma_scale = SigmaScale::of_steps(&fork.steps);
         fork.misfits = parent.misfits.get(..step).unwrap_or_default().to_vec();
         // Of steps that are kept as summaries the residuals are not known any more.
         fork.image_residuals = ImageResiduals::of_steps(fork.steps.iter().map(Arc::as_ref));
@@ -160,8 +165,10 @@ impl RunRecord {
         fork
     }
 
-    /// Appends a step and updates alignment and warnings.
-    pub fn push(&mut self, record: StepRecord) {
+    /// Appends a step with the scale of the standard deviations of its calibration, and updates alignment and warnings.
+    pub fn push(&mut self, mut record: StepRecord) {
+        self.sigma_scale.observe(&record.report);
+        scale_sigmas(&mut record.report.calibration, self.sigma_scale.factor());
         if let (Some(newest), Some(ground_truth)) = (record.report.newest(), &record.ground_truth) {
             self.alignment_sums.add(&newest.world_from_imu.translation_m, &ground_truth.translation_m);
             self.alignment =
@@ -259,6 +266,12 @@ impl RunRecord {
         traced.or_else(|| self.recomputed.get(&number)).or_else(|| self.steps.get(number))
     }
 
+    /// Scales the standard deviations of a recomputed record of a step as in that step.
+    pub(in crate::session) fn scale_as(&self, number: usize, record: &mut StepRecord) {
+        let factor = self.steps.get(number).map_or(1.0, |step| step.report.calibration.sigma_scale);
+        scale_sigmas(&mut record.report.calibration, factor);
+    }
+
     /// True if only the summary of a step is stored.
     pub(in crate::session) fn has_only_summary(&self, number: usize) -> bool {
         self.steps.get(number).is_some_and(|step| step.summary_only) && !self.recomputed.contains_key(&number)
@@ -268,7 +281,10 @@ impl RunRecord {
     pub(in crate::session) fn add_recomputed(&mut self, number: usize, steps: Vec<(usize, StepRecord)>) {
         let summary_only = |step: usize| self.steps.get(step).is_some_and(|step| step.summary_only);
         let steps: Vec<_> = steps.into_iter().filter(|(step, _)| summary_only(*step)).collect();
-        self.recomputed.extend(steps.into_iter().map(|(step, record)| (step, Arc::new(record))));
+        for (step, mut record) in steps {
+            self.scale_as(step, &mut record);
+            self.recomputed.insert(step, Arc::new(record));
+        }
         while self.recomputed.len() > MAX_RECOMPUTED {
             let (first, last) = (self.recomputed.first_key_value(), self.recomputed.last_key_value());
             let (Some((first, _)), Some((last, _))) = (first, last) else { return };

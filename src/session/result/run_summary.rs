@@ -39,6 +39,9 @@ pub struct CalibrationSummary {
     pub parameterization: String,
     /// Number of calibration parameters.
     pub columns: usize,
+    /// Factor on the standard deviations of the measurements, at least 1: the root mean square change of the estimates
+    /// in units of the change that their standard deviations allow.
+    pub sigma_scale: f64,
     /// The parameters in column order.
     pub parameters: Vec<ParameterSummary>,
     /// Calibration table: verdicts of the whole flight, in groups; empty for a run with fixed calibration.
@@ -225,6 +228,7 @@ fn calibration(recording: &Recording, run: &RunRecord) -> CalibrationSummary {
         return CalibrationSummary {
             parameterization: run.spec.parameterization.name().to_owned(),
             columns: 0,
+            sigma_scale: 1.0,
             parameters: Vec::new(),
             estimability: Vec::new(),
             chain_error: None,
@@ -265,6 +269,7 @@ fn calibration(recording: &Recording, run: &RunRecord) -> CalibrationSummary {
     CalibrationSummary {
         parameterization: last.parameterization.to_string(),
         columns: last.parameters.len(),
+        sigma_scale: last.sigma_scale,
         parameters,
         estimability: flight_table(recording, run),
         chain_error: chain_error(&last.classical),

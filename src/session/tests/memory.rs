@@ -42,7 +42,7 @@ pub(super) fn recorded_with(
 }
 
 /// A run without its observability analysis.
-pub(super) fn estimated(flight: &SyntheticFlight, spec: &str) -> RunRecord {
+pub(in crate::session) fn estimated(flight: &SyntheticFlight, spec: &str) -> RunRecord {
     run_by(estimated_step, flight, spec, None)
 }
 
