@@ -6,6 +6,7 @@ use anyhow::Result;
 use dcvins::export::{ScreenshotOptions, draw_panel, draw_panel_svg, png_bytes};
 use dcvins::flight_log::ImageReader;
 use dcvins::geometry::{ns_from_seconds, seconds_from_ns};
+use dcvins::gimbal::ParameterId;
 use dcvins::gui::PanelName;
 use dcvins::gui::comparison::ComparisonView;
 use dcvins::gui::theme::ThemeName;
@@ -22,6 +23,8 @@ const WIDTH: u32 = 720;
 const PIXELS_PER_POINT: u32 = 2;
 /// Largest height of a figure in points, 203 mm in print: a page of A4 or Letter with the caption.
 const MAX_HEIGHT: f32 = 860.0;
+/// Number of runs up to which each has its own figures of parameters and ranks.
+const FEW_RUNS: usize = 2;
 
 struct Wanted {
     panel: PanelName,
@@ -104,10 +107,15 @@ fn whole_log(recording: &Recording, end_ns: i64) -> Vec<Wanted> {
         figures.push(wanted(recording, PanelName::Comparison, Some(ComparisonView::Errors), 0, end_ns));
     }
     let mut first: Option<&str> = None;
+    let mut drawn: Vec<ParameterId> = Vec::new();
     for (run, record) in recording.runs.iter().enumerate() {
-        if record.steps.last().is_none_or(|step| step.report.calibration.parameters.is_empty()) {
+        let parameters = record.steps.last().map_or(&[][..], |step| &step.report.calibration.parameters);
+        // Plots have the values of all runs; of many runs only parameters without a plot get another figure.
+        let is_drawn = parameters.iter().all(|parameter| drawn.contains(parameter));
+        if parameters.is_empty() || recording.runs.len() > FEW_RUNS && is_drawn {
             continue;
         }
+        drawn.extend(parameters);
         let mut figure = wanted(recording, PanelName::Convergence, None, run, end_ns);
         match first {
             Some(earlier) => {
@@ -141,9 +149,10 @@ fn at_stamp(recording: &Recording, cursor_ns: i64) -> Vec<Wanted> {
     // Beside an image both have one height.
     scene.height = figures.last().map_or(scene.height, |image| image.height);
     figures.push(scene);
-    figures.push(wanted(recording, PanelName::Residuals, None, 0, cursor_ns));
     let mut first: Option<&str> = None;
-    for (run, record) in recording.runs.iter().enumerate() {
+    // Of many runs, the table of results has the ranks.
+    let ranked_runs = if recording.runs.len() > FEW_RUNS { 1 } else { FEW_RUNS };
+    for (run, record) in recording.runs.iter().enumerate().take(ranked_runs) {
         let ranked = record.step_at(cursor_ns).and_then(|step| step.rank.as_ref());
         if ranked.is_none_or(|rank| rank.parameters.is_empty()) {
             continue;
@@ -160,5 +169,7 @@ fn at_stamp(recording: &Recording, cursor_ns: i64) -> Vec<Wanted> {
         }
         figures.push(figure);
     }
+    // The text of the next section continues on the page of a low figure.
+    figures.push(wanted(recording, PanelName::Residuals, None, 0, cursor_ns));
     figures
 }

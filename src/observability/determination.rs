@@ -114,10 +114,12 @@ impl Determination {
         self.look().1
     }
 
-    /// Name, on a screen after the symbol.
+    /// Name, on a screen after the symbol, on a page after `pass` or `fail` by the required accuracy.
     pub fn shown(self, medium: Medium) -> String {
         match medium {
             Medium::Screen => format!("{} {}", self.look().0, self.name()),
+            Medium::Page if self.is_met() => format!("pass, {}", self.name()),
+            Medium::Page if self.is_improvable() => format!("fail, {}", self.name()),
             Medium::Page => self.name().to_owned(),
         }
     }

@@ -7,10 +7,11 @@ use serde::Serialize;
 
 use super::inputs::InputFile;
 use super::rank_intervals::{RankInterval, rank_intervals};
-use super::verdict::{RunVerdict, Statement, log_statement};
-use crate::geometry::seconds_from_ns;
+use super::verdict::{RunVerdict, Statement, last_position_sigma_m, log_statement};
+use crate::geometry::{median, seconds_from_ns};
 use crate::log_check::CheckReport;
-use crate::session::{FlightParameter, Recording, RunRecord, RunSummary, WarningLine, log_warning_lines};
+use crate::session::{FlightParameter, PoseError, Recording, RunRecord, RunSummary, WarningLine, log_warning_lines};
+use crate::table::Medium::Page;
 use crate::text::log_name;
 
 /// A notable event of a run.
@@ -25,12 +26,26 @@ pub(super) struct ReportEvent {
     pub(super) times: usize,
 }
 
+impl ReportEvent {
+    /// For example `2.60 s, initialized from motion: 118 landmarks`.
+    pub(super) fn sentence(&self) -> String {
+        let times = if self.times > 1 { format!(" ({} consecutive frames)", self.times) } else { String::new() };
+        format!("{} s, {}: {}{times}", Page.fixed(self.time_s, 2), self.kind, self.message)
+    }
+}
+
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(super) struct RunContent {
     pub(super) label: String,
     /// The verdict at the top of the page.
     pub(super) verdict: RunVerdict,
     pub(super) summary: RunSummary,
+    /// Standard deviation of the last position in metres, relative to the first estimated frame.
+    pub(super) position_sigma_m: Option<f64>,
+    /// Mean squared error over covariance of the poses (NEES), 6 when consistent; `None` without ground truth.
+    pub(super) nees: Option<f64>,
+    /// Median over the frames of the RMS of the reprojection residuals after the solve.
+    pub(super) reprojection_px: Option<f64>,
     /// Calibration table, equal to the summary's.
     pub(super) estimability: Vec<FlightParameter>,
     #[serde(rename = "rank_story")]
@@ -72,6 +87,9 @@ impl ReportContent {
             RunContent {
                 label: run.spec.label.clone(),
                 verdict: RunVerdict::new(recording, run, &summary),
+                position_sigma_m: last_position_sigma_m(run),
+                nees: PoseError::mean_nees(&run.pose_errors()),
+                reprojection_px: reprojection_px(run),
                 estimability: summary.calibration.estimability.clone(),
                 summary,
                 rank_intervals: rank_intervals(run, &recording.rig),
@@ -94,6 +112,11 @@ impl ReportContent {
             log_warnings,
         }
     }
+}
+
+fn reprojection_px(run: &RunRecord) -> Option<f64> {
+    let estimated = run.steps.iter().filter(|step| step.report.newest().is_some());
+    median(estimated.map(|step| step.report.reprojection_rms_after_px).filter(|px| px.is_finite()))
 }
 
 /// Notable events, equal ones of consecutive frames merged, and the counts of the others by kind.

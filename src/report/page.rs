@@ -2,13 +2,15 @@
 
 use maud::{Markup, html};
 
-use super::content::{ReportContent, ReportFigure, RunContent};
+use super::content::{ReportContent, ReportEvent, ReportFigure, RunContent};
 use super::html::{document, figure, icon, list, list_in_columns, unbroken};
 use super::rank_intervals::RankInterval;
 use super::tables;
-use super::verdict::{Statement, StatementLevel};
+use super::verdict::{OBSERVABILITY, Statement, StatementLevel};
 use crate::log_check::Trust;
+use crate::session::FlightParameter;
 use crate::table::Medium::Page;
+use crate::text::Named as _;
 
 pub(super) fn page(content: &ReportContent, figures: &[ReportFigure]) -> String {
     let title = format!("Flight report: {}", content.log);
@@ -19,13 +21,9 @@ pub(super) fn page(content: &ReportContent, figures: &[ReportFigure]) -> String 
         }
         p.lead { (lead(content)) }
         (contents(content))
-        (verdict_section(content))
-        h2 #accuracy { "Accuracy" }
-        (tables::accuracy(content))
-        (tables::frames(content))
-        @if let Some(trajectories) = tables::trajectories(content) {
-            (trajectories)
-        }
+        h2 #results { "Results" }
+        (tables::runs(content))
+        (log_verdict(content))
         @if let Some(calibration) = tables::calibration(&content.runs) {
             h2 #calibration { "Calibration" }
             (calibration)
@@ -75,7 +73,7 @@ fn answer(content: &ReportContent, run: &RunContent) -> Markup {
             @if content.runs.len() > 1 { (run.label) ": " }
             (icon(level)) " "
             strong { (unbroken(sentence)) }
-            @if !found.remedy.is_empty() { br; "→ " (found.remedy) }
+            @if !found.remedy.is_empty() { br; "Remedy: " (found.remedy) }
         }
     }
 }
@@ -97,36 +95,11 @@ fn lead(content: &ReportContent) -> String {
     )
 }
 
-/// The verdicts, before any figure: one table for each run and one for the log.
-fn verdict_section(content: &ReportContent) -> Markup {
+/// Findings about log and rig in one sentence; their section has them all.
+fn log_verdict(content: &ReportContent) -> Markup {
+    let Statement { topic, mark, text, .. } = &content.log_verdict;
     html! {
-        h2 #verdict { "Verdict" }
-        @for run in &content.runs {
-            @if content.runs.len() > 1 {
-                h3 { "Run " (run.label) }
-            }
-            (statements(&run.verdict.statements))
-        }
-        @if content.runs.len() > 1 {
-            h3 { "Log" }
-        }
-        (statements(std::slice::from_ref(&content.log_verdict)))
-    }
-}
-
-fn statements(statements: &[Statement]) -> Markup {
-    html! {
-        dl.verdict {
-            @for statement in statements {
-                div {
-                    dt { (icon(statement.mark)) " " (statement.topic) }
-                    dd {
-                        p { (unbroken(&statement.text)) }
-                        (list(&statement.details.iter().map(|line| unbroken(line)).collect::<Vec<_>>()))
-                    }
-                }
-            }
-        }
+        p { (icon(*mark)) " " (topic) ": " (text) }
     }
 }
 
@@ -134,8 +107,7 @@ fn contents(content: &ReportContent) -> Markup {
     html! {
         nav {
             ul {
-                li { a href="#verdict" { "Verdict" } }
-                " " li { a href="#accuracy" { "Accuracy" } }
+                li { a href="#results" { "Results" } }
                 @if content.runs.iter().any(|run| !run.estimability.is_empty()) {
                     " " li { a href="#calibration" { "Calibration" } }
                 }
@@ -172,18 +144,35 @@ fn grouped(figures: &[ReportFigure]) -> Markup {
 
 fn run_section(index: usize, run: &RunContent) -> Markup {
     let frequent: Vec<String> = run.frequent_events.iter().map(|(kind, count)| format!("{kind} {count}")).collect();
+    let why: Vec<String> = run.estimability.iter().filter_map(why_line).collect();
+    let events: Vec<String> = run.events.iter().map(ReportEvent::sentence).collect();
     html! {
         h2 id={ "run-" (index) } { "Run " (run.label) }
+        @for statement in run.verdict.statements.iter().filter(|statement| statement.topic == OBSERVABILITY) {
+            p { (icon(statement.mark)) " " (unbroken(&statement.text)) }
+            (list_in_columns(&statement.details))
+        }
+        @if !why.is_empty() {
+            h3 { "Parameters that the flight alone does not determine" }
+            (list_in_columns(&why))
+        }
         (rank_section(run))
         h3 { "Events and warnings" }
-        @if !run.events.is_empty() {
-            (tables::events(run))
-        }
+        (list_in_columns(&events))
         @if !frequent.is_empty() {
             p { "Number of other events: " (frequent.join(", ")) "." }
         }
         (list(&run.summary.warnings))
     }
+}
+
+/// Reason of a verdict, the time since when it holds, and what helps; `None` for a determined parameter.
+fn why_line(parameter: &FlightParameter) -> Option<String> {
+    let texts = [parameter.reason.as_str(), parameter.remedy.as_str()];
+    let why: Vec<&str> = texts.into_iter().filter(|text| !text.is_empty()).collect();
+    let since = parameter.since_s().map_or_else(String::new, |since_s| format!(" since {} s", Page.fixed(since_s, 2)));
+    let (name, verdict) = (&parameter.name, parameter.verdict.name());
+    (!why.is_empty()).then(|| format!("{name}, {verdict}{since}: {}", why.join(" · ")))
 }
 
 fn rank_section(run: &RunContent) -> Markup {

@@ -1,121 +1,169 @@
 //! The tables of a report.
 
-use std::sync::Arc;
-
 use maud::{Markup, html};
 
 use super::InputFile;
-use super::content::{ReportContent, ReportEvent, RunContent};
-use super::html::{cells, is_number, list_in_columns, table, table_of_texts, unbroken};
+use super::content::{ReportContent, RunContent};
+use super::html::{icon, list_in_columns, table, table_of_texts};
+use super::verdict::{StatementLevel, chain_error};
 use crate::log_check::{CheckReport, Finding, Severity, TopicReport};
 use crate::observability::Determination;
 use crate::session::{CalibrationRow, TrajectoryAccuracy, TrajectoryLane};
-use crate::table::Column;
 use crate::table::Medium::Page;
+use crate::table::{Cell, Column, Tone, distinct};
+use crate::text::Named as _;
 
-/// Frame counts of each run.
-pub(super) fn frames(content: &ReportContent) -> Markup {
-    type RunColumn<'a> = Column<'a, RunContent>;
-    let initialized = |run: &RunContent| {
-        run.summary.frames.initialized_at_s.map_or_else(|| "never".to_owned(), |time_s| Page.fixed(time_s, 2))
-    };
-    let columns = [
-        RunColumn::page("run", |run| run.label.clone()),
-        RunColumn::page("camera", |run| run.summary.camera.clone()),
-        RunColumn::page("images", |run| run.summary.frames.total),
-        RunColumn::page("estimated frames", |run| run.summary.frames.estimated),
-        RunColumn::page("keyframes", |run| run.summary.frames.keyframes),
-        RunColumn::page("initialized at, s", initialized),
-        RunColumn::page("restarts", |run| run.summary.frames.restarts),
-        RunColumn::page("path length, m", |run| Page.fixed(run.summary.length_m, 1)),
-    ];
-    table("Frames and path length", &columns, &content.runs)
+/// Run of the program, or trajectory of another one, in the table of results.
+struct ResultColumn<'a> {
+    label: &'a str,
+    run: Option<&'a RunContent>,
+    lane: Option<&'a TrajectoryLane>,
+    accuracy: Option<&'a TrajectoryAccuracy>,
+    /// Reason why there is no accuracy.
+    missing: Option<&'a str>,
 }
 
-/// Trajectory errors of each run, and of each trajectory of another program.
-pub(super) fn accuracy(content: &ReportContent) -> Markup {
-    /// Of a label and its accuracy.
-    type AccuracyColumn<'a> = Column<'a, (&'a String, &'a TrajectoryAccuracy)>;
-    // The trajectories are the same in every summary.
-    let trajectories = content.runs.first().map_or(&[][..], |run| &run.summary.trajectories);
-    let of_runs = content.runs.iter().map(|run| (&run.label, &run.summary.accuracy, &run.summary.accuracy_missing));
-    let of_trajectories =
-        trajectories.iter().map(|lane| (&lane.label, &lane.evaluation.accuracy, &lane.accuracy_missing));
-    let all: Vec<_> = of_runs.chain(of_trajectories).collect();
-    // All runs have relative errors over the same lengths, as far as their paths are long enough.
-    let relatives = all.iter().filter_map(|&(_, accuracy, _)| accuracy.as_ref()).flat_map(|found| &found.rpe);
+impl<'a> ResultColumn<'a> {
+    /// All runs, then all trajectories, which are the same in every summary.
+    fn all(content: &'a ReportContent) -> Vec<Self> {
+        let runs = content.runs.iter().map(|run| Self {
+            label: &run.label,
+            run: Some(run),
+            lane: None,
+            accuracy: run.summary.accuracy.as_ref(),
+            missing: run.summary.accuracy_missing.as_deref(),
+        });
+        let lanes = content.runs.first().map_or(&[][..], |run| &run.summary.trajectories);
+        let trajectories = lanes.iter().map(|lane| Self {
+            label: &lane.label,
+            run: None,
+            lane: Some(lane),
+            accuracy: lane.evaluation.accuracy.as_ref(),
+            missing: lane.accuracy_missing.as_deref(),
+        });
+        runs.chain(trajectories).collect()
+    }
+
+    fn ate_text(&self) -> Option<String> {
+        let missing = || self.missing.map(str::to_owned);
+        self.accuracy.map(|accuracy| Page.fixed(accuracy.ate_rmse_m, 4)).or_else(missing)
+    }
+
+    fn requirement_text(&self) -> Option<String> {
+        let requirement = self.run?.summary.answer.requirement.as_ref()?;
+        Some(format!("{} of {} ({})", requirement.met, requirement.parameters, requirement.required))
+    }
+}
+
+/// Results of all runs side by side: a column for each run and each trajectory of another program.
+pub(super) fn runs(content: &ReportContent) -> Markup {
+    type Row<'a> = Column<'a, ResultColumn<'a>>;
+    let results = ResultColumn::all(content);
+    let relatives = results.iter().filter_map(|it| it.accuracy).flat_map(|found| &found.rpe);
     let mut lengths_m: Vec<f64> = relatives.map(|relative| relative.delta_m).collect();
     lengths_m.sort_by(f64::total_cmp);
     lengths_m.dedup();
-    let mut columns = vec![
-        AccuracyColumn::page("run", |(label, _)| (*label).clone()),
-        AccuracyColumn::page("ATE RMSE, m", |(_, accuracy)| Page.fixed(accuracy.ate_rmse_m, 4)),
-        AccuracyColumn::page("mean, m", |(_, accuracy)| Page.fixed(accuracy.ate_mean_m, 4)),
-        AccuracyColumn::page("median, m", |(_, accuracy)| Page.fixed(accuracy.ate_median_m, 4)),
-        AccuracyColumn::page("max, m", |(_, accuracy)| Page.fixed(accuracy.ate_max_m, 4)),
-        AccuracyColumn::page("RMSE, % of length", |(_, accuracy)| Page.fixed(accuracy.ate_percent_of_length, 3)),
+    let decimals = |value: Option<f64>, decimals: usize| value.map(|value| Page.fixed(value, decimals));
+    let mut rows = vec![
+        Row::page("trust", |it| it.run.map(|run| run.summary.answer.trust.name())),
+        Row::page("parameters within the required accuracy", ResultColumn::requirement_text),
+        Row::page("position error (ATE, RMSE), m", ResultColumn::ate_text),
+        Row::page("% of the path", move |it| decimals(it.accuracy.map(|found| found.ate_percent_of_length), 3)),
+        Row::page("median, m", move |it| decimals(it.accuracy.map(|found| found.ate_median_m), 4)),
+        Row::page("largest, m", move |it| decimals(it.accuracy.map(|found| found.ate_max_m), 4)),
     ];
-    columns.extend(lengths_m.into_iter().map(|length_m| {
-        AccuracyColumn::page(format!("RPE over {length_m} m"), move |(_, accuracy)| {
-            let relative = accuracy.rpe.iter().find(|relative| relative.delta_m == length_m)?;
+    rows.extend(lengths_m.into_iter().map(|length_m| {
+        Row::page(format!("relative pose error over {length_m} m (RPE, RMSE)"), move |it| {
+            let relative = it.accuracy?.rpe.iter().find(|relative| relative.delta_m == length_m)?;
             let (translation_m, rotation_deg) = (relative.translation_rmse_m, relative.rotation_rmse_deg);
             Some(format!("{} m, {}°", Page.fixed(translation_m, 3), Page.fixed(rotation_deg, 2)))
         })
     }));
-    let mut rows = Vec::new();
-    for (label, accuracy, missing) in all {
-        rows.push(match accuracy {
-            Some(accuracy) => cells(&columns, &(label, accuracy)),
-            None => vec![label.clone(), missing.clone().unwrap_or_default()],
-        });
-    }
-    table_of_texts(
-        "Absolute trajectory error (ATE) after alignment by yaw and position; relative pose error (RPE, RMSE)",
-        columns.iter().filter_map(|column| column.heading(Page)),
-        &rows,
-    )
+    rows.extend([
+        Row::page("σ of the last position, m", move |it| decimals(it.run?.position_sigma_m, 4)),
+        Row::page("squared error over covariance (NEES, 6 when consistent)", move |it| decimals(it.run?.nees, 1)),
+        Row::page("factor on σ by the run's consistency", move |it| {
+            decimals(it.run.map(|run| run.summary.calibration.sigma_scale), 2)
+        }),
+        Row::page("extrinsics error by the rig", |it| {
+            it.run?.summary.calibration.chain_error_initial.as_ref().map(chain_error)
+        }),
+        Row::page("extrinsics error by the run", |it| {
+            it.run?.summary.calibration.chain_error.as_ref().map(chain_error)
+        }),
+        Row::page("reprojection residual (median of RMS), px", move |it| decimals(it.run?.reprojection_px, 2)),
+        Row::page("estimated frames", |it| {
+            let poses = || it.lane.map(|lane| format!("{} poses", lane.track.samples().len()));
+            let frames = it.run.map(|run| &run.summary.frames);
+            frames.map(|frames| format!("{} of {}", frames.estimated, frames.total)).or_else(poses)
+        }),
+        Row::page("initialized at, s", move |it| {
+            let at_s = decimals(it.run?.summary.frames.initialized_at_s, 2);
+            Some(at_s.unwrap_or_else(|| "never".to_owned()))
+        }),
+        Row::page("keyframes, restarts", |it| {
+            it.run.map(|run| format!("{}, {}", run.summary.frames.keyframes, run.summary.frames.restarts))
+        }),
+        Row::page("informed rank at the end", |it| {
+            let rank = it.run?.summary.rank.as_ref()?;
+            Some(format!("{} of {}", rank.rank_informed, rank.columns))
+        }),
+        Row::page("path length, m", |it| {
+            let length_m = it.run.map(|run| run.summary.length_m).or_else(|| it.lane.map(|lane| lane.length_m));
+            length_m.map(|length_m| Page.fixed(length_m, 1))
+        }),
+        Row::page("parameterization", |it| it.run.map(|run| run.summary.calibration.parameterization.clone())),
+        Row::page("camera; file or topic", |it| {
+            it.run.map(|run| run.summary.camera.clone()).or_else(|| it.lane.map(|lane| lane.source.clone()))
+        }),
+    ]);
+    let shown = rows.iter().filter(|row| results.iter().any(|result| row.cell(result) != Cell::Empty));
+    let texts = shown.map(|row| {
+        let heading = row.heading(Page).unwrap_or_default().to_owned();
+        let cells = results.iter().map(|result| row.shown_text(result, Page));
+        std::iter::once(heading).chain(cells).collect()
+    });
+    let texts: Vec<Vec<String>> = texts.collect();
+    let headings = std::iter::once("").chain(results.iter().map(|result| result.label));
+    table_of_texts("All runs; errors after alignment by yaw and position", headings, &texts)
 }
 
-/// Trajectories of other programs, `None` if there are none.
-pub(super) fn trajectories(content: &ReportContent) -> Option<Markup> {
-    type LaneColumn<'a> = Column<'a, Arc<TrajectoryLane>>;
-    let lanes = &content.runs.first()?.summary.trajectories;
-    let columns = [
-        LaneColumn::page("trajectory", |lane| lane.label.clone()),
-        LaneColumn::page("file or topic", |lane| lane.source.clone()),
-        LaneColumn::page("poses", |lane| lane.track.samples().len()),
-        LaneColumn::page("path length, m", |lane| Page.fixed(lane.length_m, 1)),
-    ];
-    let caption = "Trajectories of other programs: poses only, without calibration, features and residuals";
-    (!lanes.is_empty()).then(|| table(caption, &columns, lanes))
-}
-
-/// Calibration parameters of all runs: values, verdicts of the flight, and below them reasons and what helps; `None`
-/// without calibration.
+/// Calibration parameters as rows, with the columns of each run side by side; `None` without calibration.
 pub(super) fn calibration(runs: &[RunContent]) -> Option<Markup> {
     let calibrated: Vec<_> = runs.iter().filter(|run| !run.estimability.is_empty()).collect();
     calibrated.first()?;
-    let all: Vec<CalibrationRow<'_>> = calibrated.iter().flat_map(|run| rows_of(run)).collect();
+    let rows: Vec<Vec<CalibrationRow<'_>>> = calibrated.iter().map(|run| rows_of(run)).collect();
     let mut columns = CalibrationRow::columns();
-    columns.retain(|column| column.is_shown(Page, all.iter()));
+    columns.retain(|column| column.is_shown(Page, rows.iter().flatten()));
+    // The columns before the value are about the parameter, the others about the run.
+    let of_parameter = columns.iter().position(|column| column.name == "value").unwrap_or_default();
+    let (of_parameter, of_run) = columns.split_at(of_parameter);
+    let names = distinct(rows.iter().flatten().map(|row| row.flight.name.as_str()));
+    let found = |name: &str| -> Vec<Option<&CalibrationRow<'_>>> {
+        rows.iter().map(|of_run| of_run.iter().find(|row| row.flight.name == name)).collect()
+    };
     Some(html! {
         p.rule {
-            "Values at the end; verdicts of the whole flight (" (Determination::RULE)
-            "). Below a parameter that is not determined: the reason, and what helps."
+            "Values at the end; pass: within the required accuracy; verdicts of the whole flight (" (Determination::RULE) ")."
         }
-        table.calibration {
-            thead { tr { @for column in &columns { th scope="col" { (column.heading(Page).unwrap_or_default()) } } } }
-            @for run in calibrated {
-                tbody.run {
+        table.calibration.narrow[calibrated.len() > 2] {
+            thead {
+                @if calibrated.len() > 1 {
                     tr {
-                        th colspan=(columns.len()) scope="rowgroup" {
-                            "Calibration of run " (run.label) ", parameterization " (run.summary.calibration.parameterization)
-                            ", σ × " (Page.fixed(run.summary.calibration.sigma_scale, 2)) " by its consistency"
-                        }
+                        th colspan=(of_parameter.len()) {}
+                        @for run in &calibrated { th colspan=(of_run.len()) scope="colgroup" { (run.label) } }
                     }
                 }
-                @for row in rows_of(run) {
-                    (calibration_rows(&columns, &row))
+                tr {
+                    @for column in of_parameter { th scope="col" { (column.heading(Page).unwrap_or_default()) } }
+                    @for _ in &calibrated {
+                        @for column in of_run { th scope="col" { (column.heading(Page).unwrap_or_default()) } }
+                    }
+                }
+            }
+            tbody {
+                @for name in names {
+                    (calibration_row(of_parameter, of_run, &found(name)))
                 }
             }
         }
@@ -128,37 +176,44 @@ fn rows_of(run: &RunContent) -> Vec<CalibrationRow<'_>> {
     rows.map(|flight| CalibrationRow { flight, summary: summary(&flight.name), waits_for_advice: false }).collect()
 }
 
-/// The rows of one parameter, which stay on one page.
-fn calibration_rows<'a>(columns: &[Column<'_, CalibrationRow<'a>>], row: &CalibrationRow<'a>) -> Markup {
-    let cells = cells(columns, row);
-    let texts = [row.flight.reason.as_str(), row.flight.remedy.as_str()];
-    let why: Vec<&str> = texts.into_iter().filter(|text| !text.is_empty()).collect();
-    let name_rows = if why.is_empty() { 1 } else { 2 };
+/// Row of one parameter; `None` for a run without it.
+fn calibration_row<'a>(
+    of_parameter: &[Column<'_, CalibrationRow<'a>>],
+    of_run: &[Column<'_, CalibrationRow<'a>>],
+    rows: &[Option<&CalibrationRow<'a>>],
+) -> Markup {
+    // Values of the rig differ between the parameterizations.
+    let common = |column: &Column<'_, CalibrationRow<'a>>| {
+        let texts: Vec<String> = rows.iter().flatten().map(|row| column.shown_text(row, Page)).collect();
+        distinct(texts).join("; ")
+    };
     html! {
-        tbody {
-            tr {
-                th scope="row" rowspan=(name_rows) { (row.flight.name) }
-                @for cell in &cells[1..] {
-                    @if is_number(cell) { td.number { (cell) } } @else { td { (cell) } }
-                }
+        tr {
+            @for (place, column) in of_parameter.iter().enumerate() {
+                @if place == 0 { th scope="row" { (common(column)) } } @else { td.number { (common(column)) } }
             }
-            @if !why.is_empty() {
-                tr.why { td colspan=(cells.len() - 1) { (unbroken(&why.join(" · "))) } }
+            @for row in rows {
+                @for (place, column) in of_run.iter().enumerate() {
+                    @let text = row.map(|row| column.shown_text(row, Page)).unwrap_or_default();
+                    @let class = if place == 0 { "number first" } else { "" };
+                    td class=(class) {
+                        @if let Some(mark) = row.and_then(|row| mark_of(column.shown_tone(row))) { (icon(mark)) " " }
+                        (text)
+                    }
+                }
             }
         }
     }
 }
 
-pub(super) fn events(run: &RunContent) -> Markup {
-    type EventColumn<'a> = Column<'a, ReportEvent>;
-    let times = |event: &ReportEvent| (event.times > 1).then(|| format!("{} consecutive frames", event.times));
-    let columns = [
-        EventColumn::page("time, s", |event| Page.fixed(event.time_s, 2)),
-        EventColumn::page("event", |event| event.kind.clone()),
-        EventColumn::page("message", |event| event.message.clone()),
-        EventColumn::page("", times),
-    ];
-    table(&format!("Events of run {}", run.label), &columns, &run.events)
+/// Icon of a tone that judges.
+fn mark_of(tone: Tone) -> Option<StatementLevel> {
+    match tone {
+        Tone::Good => Some(StatementLevel::Good),
+        Tone::Caution => Some(StatementLevel::Warning),
+        Tone::Bad => Some(StatementLevel::Error),
+        Tone::Strong | Tone::Plain | Tone::Weak | Tone::Accent => None,
+    }
 }
 
 /// Findings of `check` about the log and its rig, most severe first; checks without a problem as a list.
@@ -171,7 +226,7 @@ pub(super) fn findings(check: &CheckReport) -> Markup {
         FindingColumn::page("finding", |found| format!("{}: {}", found.title, found.evidence)),
         FindingColumn::page("remedy", |found| found.remedy.clone()),
     ];
-    let good: Vec<String> = good.iter().map(|found| format!("{}: {}", found.title, found.evidence)).collect();
+    let good: Vec<String> = good.iter().map(|found| found.title.clone()).collect();
     html! {
         @if others.is_empty() {
             p { "No problems found in the log and the rig." }

@@ -20,6 +20,9 @@ const MAX_ATE_PERCENT: f64 = 1.0;
 /// Number of parameters by which a direction is named.
 const NAMED: usize = 4;
 
+/// Topic of the statement about ranks, which the page has with each run.
+pub(super) const OBSERVABILITY: &str = "Observability";
+
 /// Severity of a statement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -63,10 +66,20 @@ fn statement(topic: &'static str, mark: StatementLevel, text: String, details: V
     Statement { topic, mark, text, details }
 }
 
+/// Last step with a covariance of its pose.
+fn last_with_covariance(run: &RunRecord) -> Option<&StepRecord> {
+    run.steps.iter().rev().map(AsRef::as_ref).find(|step| step.report.newest_pose_covariance.is_some())
+}
+
+/// Standard deviation of the last position with a covariance, in metres.
+pub(super) fn last_position_sigma_m(run: &RunRecord) -> Option<f64> {
+    Some(last_with_covariance(run)?.report.newest_pose_covariance?.position_sigma_m())
+}
+
 /// Errors against the ground truth, or the covariance of the last pose if there is none.
 fn accuracy(recording: &Recording, run: &RunRecord, summary: &RunSummary) -> Statement {
     let nees = PoseError::mean_nees(&run.pose_errors());
-    let last = run.steps.iter().rev().find_map(|step| Some((step, step.report.newest_pose_covariance?)));
+    let last = last_with_covariance(run).and_then(|last| Some((last, last.report.newest_pose_covariance?)));
     let uncertainty = last.map(|(last, covariance)| {
         let text = format!(
             "at {} s position ±{}, attitude ±{}° (1σ, relative to the first estimated frame)",
@@ -203,7 +216,7 @@ fn observability(recording: &Recording, run: &RunRecord) -> Option<Statement> {
     } else {
         StatementLevel::Warning
     };
-    Some(statement("Observability", mark, text, details))
+    Some(statement(OBSERVABILITY, mark, text, details))
 }
 
 /// Causes of null and of uninformed directions.
@@ -295,7 +308,7 @@ fn length(value_m: f64) -> String {
     if value_m < 0.1 { format!("{} mm", Page.fixed(1e3 * value_m, 1)) } else { format!("{} m", Page.fixed(value_m, 2)) }
 }
 
-fn chain_error(error: &ChainDistance) -> String {
+pub(super) fn chain_error(error: &ChainDistance) -> String {
     format!(
         "{} mm, {}°",
         Page.fixed(error.translation_mean_m * 1e3, 1),

@@ -24,23 +24,31 @@ fn report(folder: &Path, threads: &str) -> (String, String) {
     (text("report.html"), text("report.json"))
 }
 
-/// Checks that the page begins with the verdict of each run, and that one table has every parameter.
+/// Checks that the page begins with the answers and one table of all runs, and that one table has every parameter.
 fn check_verdict(page: &str, report: &Value) {
     let figures = page.find("<figure").unwrap_or(page.len());
+    let table = |begin: &str| {
+        let parts: Vec<&str> = page.split(begin).collect();
+        assert_eq!(parts.len(), 2, "one table {begin}");
+        assert!(parts[0].len() < figures, "the table comes before the figures");
+        &parts[1][..parts[1].find("</table>").expect("the table ends")]
+    };
+    let (results, rows) = (table("All runs; errors after alignment"), table("<table class=\"calibration"));
+    let mut marks = [0; 2];
     for run in report["runs"].as_array().expect("a list") {
         let statements = run["verdict"]["statements"].as_array().expect("a list");
         let topics: Vec<&str> =
             statements.iter().map(|statement| statement["topic"].as_str().expect("a text")).collect();
         assert_eq!(topics, ["Accuracy", "Calibration", "Observability", "Estimation"]);
-        for statement in statements {
-            let at = page.find(statement["text"].as_str().expect("a text")).expect("the statement is in the page");
-            assert!(at < figures, "the verdict comes before the figures");
-        }
+        let observability = statements[2]["text"].as_str().expect("a text");
+        assert_eq!(page.matches(observability).count(), 1, "{observability}");
         let label = run["label"].as_str().expect("a text");
-        let heading = format!("Calibration of run {label}, parameterization");
-        assert_eq!(page.matches(&heading).count(), 1, "one table");
-        let rows = page.split(&heading).nth(1).expect("it is there");
-        let rows = &rows[..rows.find("Calibration of run").or_else(|| rows.find("</table>")).expect("the table ends")];
+        for table in [results, rows] {
+            assert_eq!(table.matches(&format!(">{label}</th>")).count(), 1, "{label} in {table}");
+        }
+        let sentence = run["summary"]["answer"]["sentence"].as_str().expect("a text");
+        let (_, words) = sentence.split_once(' ').expect("a symbol and words");
+        assert!(page.find(words).is_some_and(|at| at < figures), "{words}");
         let parameters = run["estimability"].as_array().expect("a list");
         assert_eq!(run["estimability"], run["summary"]["calibration"]["estimability"], "one table");
         assert_eq!(parameters.len(), run["summary"]["calibration"]["columns"].as_u64().expect("a count") as usize);
@@ -48,7 +56,7 @@ fn check_verdict(page: &str, report: &Value) {
             let named = format!(">{}</th>", parameter["name"].as_str().expect("a text"));
             assert_eq!(rows.matches(&named).count(), 1, "{named} in {rows}");
             let reason = parameter["reason"].as_str().expect("a text");
-            assert!(rows.contains(&reason.replace('<', "&lt;")), "{reason} in {rows}");
+            assert!(page.contains(&reason.replace('<', "&lt;")), "{reason}");
             let number = |key: &str| parameter[key].as_f64();
             let (sigma, required) = (number("sigma").expect("a number"), number("required").expect("a number"));
             let by_sigma = if number("flight_sigma").is_some_and(|alone| alone <= required) {
@@ -64,6 +72,7 @@ fn check_verdict(page: &str, report: &Value) {
             let verdict = parameter["verdict"].as_str().expect("a text");
             assert!(verdict == by_sigma || verdict == "redundant" && by_sigma != "determined", "{parameter}");
             let is_met = ["determined", "given"].contains(&verdict);
+            marks[usize::from(is_met)] += usize::from(verdict != "redundant");
             assert_eq!(is_met, parameter["cause"].is_null(), "{parameter}");
             assert_eq!(is_met, parameter["reason"] == "", "{parameter}");
             assert!(parameter["since_s"].as_f64().expect("a number") > 0.0, "{parameter}");
@@ -71,6 +80,8 @@ fn check_verdict(page: &str, report: &Value) {
         let redundant = parameters.iter().filter(|parameter| parameter["verdict"] == "redundant").count();
         assert_eq!(redundant > 0, label == "old", "only the classical parameterization has redundant columns");
     }
+    let counts = ["fail, ", "pass, "].map(|mark| rows.matches(mark).count());
+    assert_eq!(counts, marks, "parameters that fail and pass in {rows}");
     assert!(page.contains("Suggested excitation: "));
     assert!(page.find(report["log_verdict"]["text"].as_str().expect("a text")).expect("it is in the page") < figures);
 }
