@@ -110,8 +110,8 @@ fn whole_log(recording: &Recording, end_ns: i64) -> Vec<Wanted> {
     let mut drawn: Vec<ParameterId> = Vec::new();
     for (run, record) in recording.runs.iter().enumerate() {
         let parameters = record.steps.last().map_or(&[][..], |step| &step.report.calibration.parameters);
-        // Plots have the values of all runs; of many runs only parameters without a plot get another figure.
-        let is_drawn = parameters.iter().all(|parameter| drawn.contains(parameter));
+        // Plots have the values of all runs; of many runs only those without any plot get another figure.
+        let is_drawn = parameters.iter().any(|parameter| drawn.contains(parameter));
         if parameters.is_empty() || recording.runs.len() > FEW_RUNS && is_drawn {
             continue;
         }
@@ -139,7 +139,7 @@ fn at_stamp(recording: &Recording, cursor_ns: i64) -> Vec<Wanted> {
     let mut figures = Vec::new();
     let mut cameras: Vec<&str> = Vec::new();
     for (run, record) in recording.runs.iter().enumerate() {
-        if cameras.contains(&record.camera_key.as_str()) {
+        if cameras.contains(&record.camera_key.as_str()) || run > 0 && recording.runs.len() > FEW_RUNS {
             continue;
         }
         cameras.push(&record.camera_key);
@@ -149,6 +149,7 @@ fn at_stamp(recording: &Recording, cursor_ns: i64) -> Vec<Wanted> {
     // Beside an image both have one height.
     scene.height = figures.last().map_or(scene.height, |image| image.height);
     figures.push(scene);
+    figures.push(wanted(recording, PanelName::Residuals, None, 0, cursor_ns));
     let mut first: Option<&str> = None;
     // Of many runs, the table of results has the ranks.
     let ranked_runs = if recording.runs.len() > FEW_RUNS { 1 } else { FEW_RUNS };
@@ -169,7 +170,5 @@ fn at_stamp(recording: &Recording, cursor_ns: i64) -> Vec<Wanted> {
         }
         figures.push(figure);
     }
-    // The text of the next section continues on the page of a low figure.
-    figures.push(wanted(recording, PanelName::Residuals, None, 0, cursor_ns));
     figures
 }

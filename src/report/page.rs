@@ -10,6 +10,7 @@ use super::verdict::{OBSERVABILITY, Statement, StatementLevel};
 use crate::log_check::Trust;
 use crate::session::FlightParameter;
 use crate::table::Medium::Page;
+use crate::table::distinct;
 use crate::text::Named as _;
 
 pub(super) fn page(content: &ReportContent, figures: &[ReportFigure]) -> String {
@@ -144,7 +145,7 @@ fn grouped(figures: &[ReportFigure]) -> Markup {
 
 fn run_section(index: usize, run: &RunContent) -> Markup {
     let frequent: Vec<String> = run.frequent_events.iter().map(|(kind, count)| format!("{kind} {count}")).collect();
-    let why: Vec<String> = run.estimability.iter().filter_map(why_line).collect();
+    let why = why_lines(&run.estimability);
     let events: Vec<String> = run.events.iter().map(ReportEvent::sentence).collect();
     html! {
         h2 id={ "run-" (index) } { "Run " (run.label) }
@@ -166,13 +167,22 @@ fn run_section(index: usize, run: &RunContent) -> Markup {
     }
 }
 
-/// Reason of a verdict, the time since when it holds, and what helps; `None` for a determined parameter.
-fn why_line(parameter: &FlightParameter) -> Option<String> {
-    let texts = [parameter.reason.as_str(), parameter.remedy.as_str()];
-    let why: Vec<&str> = texts.into_iter().filter(|text| !text.is_empty()).collect();
-    let since = parameter.since_s().map_or_else(String::new, |since_s| format!(" since {} s", Page.fixed(since_s, 2)));
-    let (name, verdict) = (&parameter.name, parameter.verdict.name());
-    (!why.is_empty()).then(|| format!("{name}, {verdict}{since}: {}", why.join(" · ")))
+/// Reasons of the verdicts on parameters that the flight alone does not determine, with the time since when they hold; one
+/// line for each motion or run that helps.
+fn why_lines(parameters: &[FlightParameter]) -> Vec<String> {
+    let explained = || parameters.iter().filter(|parameter| !parameter.reason.is_empty());
+    let reason = |parameter: &FlightParameter| {
+        let since =
+            parameter.since_s().map_or_else(String::new, |since_s| format!(" since {} s", Page.fixed(since_s, 2)));
+        format!("{}, {}{since}: {}", parameter.name, parameter.verdict.name(), parameter.reason)
+    };
+    let remedies = distinct(explained().map(|parameter| parameter.remedy.as_str()));
+    let line = |remedy: &str| {
+        let reasons: Vec<String> = explained().filter(|it| it.remedy == remedy).map(reason).collect();
+        let helps = if remedy.is_empty() { String::new() } else { format!(" · {remedy}") };
+        format!("{}{helps}", reasons.join("; "))
+    };
+    remedies.into_iter().map(line).collect()
 }
 
 fn rank_section(run: &RunContent) -> Markup {

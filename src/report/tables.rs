@@ -4,11 +4,11 @@ use maud::{Markup, html};
 
 use super::InputFile;
 use super::content::{ReportContent, RunContent};
-use super::html::{icon, list_in_columns, table, table_of_texts};
+use super::html::{icon, table, table_of_texts};
 use super::verdict::{StatementLevel, chain_error};
 use crate::log_check::{CheckReport, Finding, Severity, TopicReport};
 use crate::observability::Determination;
-use crate::session::{CalibrationRow, TrajectoryAccuracy, TrajectoryLane};
+use crate::session::{CalibrationRow, FrameCounts, TrajectoryAccuracy, TrajectoryLane};
 use crate::table::Medium::Page;
 use crate::table::{Cell, Column, Tone, distinct};
 use crate::text::Named as _;
@@ -46,7 +46,21 @@ impl<'a> ResultColumn<'a> {
 
     fn ate_text(&self) -> Option<String> {
         let missing = || self.missing.map(str::to_owned);
-        self.accuracy.map(|accuracy| Page.fixed(accuracy.ate_rmse_m, 4)).or_else(missing)
+        let text = |found: &TrajectoryAccuracy| {
+            format!("{} ({} %)", Page.fixed(found.ate_rmse_m, 4), Page.fixed(found.ate_percent_of_length, 2))
+        };
+        self.accuracy.map(text).or_else(missing)
+    }
+
+    fn frames_text(&self) -> Option<String> {
+        let poses = || self.lane.map(|lane| format!("{} poses", lane.track.samples().len()));
+        let frames = self.run.map(|run| &run.summary.frames);
+        let text = |frames: &FrameCounts| {
+            let from =
+                frames.initialized_at_s.map_or_else(String::new, |at_s| format!(", from {} s", Page.fixed(at_s, 2)));
+            format!("{} of {}{from}", frames.estimated, frames.total)
+        };
+        frames.map(text).or_else(poses)
     }
 
     fn requirement_text(&self) -> Option<String> {
@@ -66,14 +80,15 @@ pub(super) fn runs(content: &ReportContent) -> Markup {
     let decimals = |value: Option<f64>, decimals: usize| value.map(|value| Page.fixed(value, decimals));
     let mut rows = vec![
         Row::page("trust", |it| it.run.map(|run| run.summary.answer.trust.name())),
-        Row::page("parameters within the required accuracy", ResultColumn::requirement_text),
-        Row::page("position error (ATE, RMSE), m", ResultColumn::ate_text),
-        Row::page("% of the path", move |it| decimals(it.accuracy.map(|found| found.ate_percent_of_length), 3)),
-        Row::page("median, m", move |it| decimals(it.accuracy.map(|found| found.ate_median_m), 4)),
-        Row::page("largest, m", move |it| decimals(it.accuracy.map(|found| found.ate_max_m), 4)),
+        Row::page("within the required accuracy", ResultColumn::requirement_text),
+        Row::page("position error (ATE, RMSE), m (% of path)", ResultColumn::ate_text),
+        Row::page("its median and maximum, m", |it| {
+            let found = it.accuracy?;
+            Some(format!("{}, {}", Page.fixed(found.ate_median_m, 4), Page.fixed(found.ate_max_m, 4)))
+        }),
     ];
     rows.extend(lengths_m.into_iter().map(|length_m| {
-        Row::page(format!("relative pose error over {length_m} m (RPE, RMSE)"), move |it| {
+        Row::page(format!("relative error over {length_m} m (RPE, RMSE)"), move |it| {
             let relative = it.accuracy?.rpe.iter().find(|relative| relative.delta_m == length_m)?;
             let (translation_m, rotation_deg) = (relative.translation_rmse_m, relative.rotation_rmse_deg);
             Some(format!("{} m, {}°", Page.fixed(translation_m, 3), Page.fixed(rotation_deg, 2)))
@@ -81,7 +96,7 @@ pub(super) fn runs(content: &ReportContent) -> Markup {
     }));
     rows.extend([
         Row::page("σ of the last position, m", move |it| decimals(it.run?.position_sigma_m, 4)),
-        Row::page("squared error over covariance (NEES, 6 when consistent)", move |it| decimals(it.run?.nees, 1)),
+        Row::page("NEES (6 when consistent)", move |it| decimals(it.run?.nees, 1)),
         Row::page("factor on σ by the run's consistency", move |it| {
             decimals(it.run.map(|run| run.summary.calibration.sigma_scale), 2)
         }),
@@ -91,16 +106,8 @@ pub(super) fn runs(content: &ReportContent) -> Markup {
         Row::page("extrinsics error by the run", |it| {
             it.run?.summary.calibration.chain_error.as_ref().map(chain_error)
         }),
-        Row::page("reprojection residual (median of RMS), px", move |it| decimals(it.run?.reprojection_px, 2)),
-        Row::page("estimated frames", |it| {
-            let poses = || it.lane.map(|lane| format!("{} poses", lane.track.samples().len()));
-            let frames = it.run.map(|run| &run.summary.frames);
-            frames.map(|frames| format!("{} of {}", frames.estimated, frames.total)).or_else(poses)
-        }),
-        Row::page("initialized at, s", move |it| {
-            let at_s = decimals(it.run?.summary.frames.initialized_at_s, 2);
-            Some(at_s.unwrap_or_else(|| "never".to_owned()))
-        }),
+        Row::page("reprojection RMS, median, px", move |it| decimals(it.run?.reprojection_px, 2)),
+        Row::page("estimated frames", ResultColumn::frames_text),
         Row::page("keyframes, restarts", |it| {
             it.run.map(|run| format!("{}, {}", run.summary.frames.keyframes, run.summary.frames.restarts))
         }),
@@ -112,9 +119,10 @@ pub(super) fn runs(content: &ReportContent) -> Markup {
             let length_m = it.run.map(|run| run.summary.length_m).or_else(|| it.lane.map(|lane| lane.length_m));
             length_m.map(|length_m| Page.fixed(length_m, 1))
         }),
-        Row::page("parameterization", |it| it.run.map(|run| run.summary.calibration.parameterization.clone())),
-        Row::page("camera; file or topic", |it| {
-            it.run.map(|run| run.summary.camera.clone()).or_else(|| it.lane.map(|lane| lane.source.clone()))
+        Row::page("camera, parameterization; or file", |it| {
+            let of_run =
+                |run: &RunContent| format!("{}, {}", run.summary.camera, run.summary.calibration.parameterization);
+            it.run.map(of_run).or_else(|| it.lane.map(|lane| lane.source.clone()))
         }),
     ]);
     let shown = rows.iter().filter(|row| results.iter().any(|result| row.cell(result) != Cell::Empty));
@@ -137,7 +145,11 @@ pub(super) fn calibration(runs: &[RunContent]) -> Option<Markup> {
     columns.retain(|column| column.is_shown(Page, rows.iter().flatten()));
     // The columns before the value are about the parameter, the others about the run.
     let of_parameter = columns.iter().position(|column| column.name == "value").unwrap_or_default();
+    let mut several = of_several_runs();
+    several.retain(|column| column.is_shown(Page, rows.iter().flatten()));
     let (of_parameter, of_run) = columns.split_at(of_parameter);
+    let (of_parameter, of_run) =
+        if calibrated.len() > 1 { (&of_parameter[..1], several.as_slice()) } else { (of_parameter, of_run) };
     let names = distinct(rows.iter().flatten().map(|row| row.flight.name.as_str()));
     let found = |name: &str| -> Vec<Option<&CalibrationRow<'_>>> {
         rows.iter().map(|of_run| of_run.iter().find(|row| row.flight.name == name)).collect()
@@ -146,7 +158,7 @@ pub(super) fn calibration(runs: &[RunContent]) -> Option<Markup> {
         p.rule {
             "Values at the end; pass: within the required accuracy; verdicts of the whole flight (" (Determination::RULE) ")."
         }
-        table.calibration.narrow[calibrated.len() > 2] {
+        table.calibration {
             thead {
                 @if calibrated.len() > 1 {
                     tr {
@@ -170,6 +182,26 @@ pub(super) fn calibration(runs: &[RunContent]) -> Option<Markup> {
     })
 }
 
+/// Columns of a run beside others: the verdicts in full are in the sections of the runs.
+fn of_several_runs<'a>() -> Vec<Column<'a, CalibrationRow<'a>>> {
+    type Cells<'a> = Column<'a, CalibrationRow<'a>>;
+    let mut columns = CalibrationRow::columns();
+    columns.retain(|column| column.name == "value");
+    let verdict = |row: &CalibrationRow<'_>| {
+        let text = row.flight.verdict.shown(Page);
+        text.split_once(", ").map_or_else(|| text.clone(), |(mark, _)| mark.to_owned())
+    };
+    let error = |row: &CalibrationRow<'_>| {
+        let sigma = row.flight.sigma.filter(|sigma| *sigma > 0.0)?;
+        Some(format!("{} σ", Page.fixed((row.summary?.error? / sigma).abs(), 1)))
+    };
+    columns.extend([
+        Cells::page("", verdict).tone(|row| row.flight.verdict.tone()),
+        Cells::page("error", error).optional(),
+    ]);
+    columns
+}
+
 fn rows_of(run: &RunContent) -> Vec<CalibrationRow<'_>> {
     let summary = |name: &str| run.summary.calibration.parameters.iter().find(|it| it.name == name);
     let rows = run.estimability.iter();
@@ -182,11 +214,10 @@ fn calibration_row<'a>(
     of_run: &[Column<'_, CalibrationRow<'a>>],
     rows: &[Option<&CalibrationRow<'a>>],
 ) -> Markup {
-    // Values of the rig differ between the parameterizations.
     let common = |column: &Column<'_, CalibrationRow<'a>>| {
-        let texts: Vec<String> = rows.iter().flatten().map(|row| column.shown_text(row, Page)).collect();
-        distinct(texts).join("; ")
+        rows.iter().flatten().next().map(|row| column.shown_text(row, Page)).unwrap_or_default()
     };
+    let is_short = rows.len() > 1;
     html! {
         tr {
             @for (place, column) in of_parameter.iter().enumerate() {
@@ -195,8 +226,7 @@ fn calibration_row<'a>(
             @for row in rows {
                 @for (place, column) in of_run.iter().enumerate() {
                     @let text = row.map(|row| column.shown_text(row, Page)).unwrap_or_default();
-                    @let class = if place == 0 { "number first" } else { "" };
-                    td class=(class) {
+                    td.number[place == 0 || is_short] {
                         @if let Some(mark) = row.and_then(|row| mark_of(column.shown_tone(row))) { (icon(mark)) " " }
                         (text)
                     }
@@ -234,8 +264,7 @@ pub(super) fn findings(check: &CheckReport) -> Markup {
             (table("Problems of the log and the rig (dcvins check)", &columns, &others))
         }
         @if !good.is_empty() {
-            p { "Checks without problems:" }
-            (list_in_columns(&good))
+            p.rule { "Checks without problems: " (good.join("; ")) "." }
         }
     }
 }

@@ -57,6 +57,6 @@ pub use record::{
     least_determined, log_warning_lines, run_warning_lines, warning_lines,
 };
 pub use result::{
-    Answer, FindingSource, RankSummary, Requirement, RunFinding, RunSummary, StageSummary, TimingSummary, Withheld,
-    flight_table, motion_after, motion_text, summarize, summarize_with_motion,
+    Answer, FindingSource, FrameCounts, RankSummary, Requirement, RunFinding, RunSummary, StageSummary, TimingSummary,
+    Withheld, flight_table, motion_after, motion_text, summarize, summarize_with_motion,
 };

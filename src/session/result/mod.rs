@@ -14,5 +14,7 @@ mod withheld;
 
 pub use answer::{Answer, FindingSource, Requirement, RunFinding};
 pub use motion::{motion_after, motion_text};
-pub use run_summary::{RankSummary, RunSummary, StageSummary, TimingSummary, summarize, summarize_with_motion};
+pub use run_summary::{
+    FrameCounts, RankSummary, RunSummary, StageSummary, TimingSummary, summarize, summarize_with_motion,
+};
 pub use withheld::{Withheld, flight_table};
