@@ -58,5 +58,5 @@ pub use record::{
 };
 pub use result::{
     Answer, FindingSource, FrameCounts, RankSummary, Requirement, RunFinding, RunSummary, StageSummary, TimingSummary,
-    Withheld, flight_table, motion_after, motion_text, summarize, summarize_with_motion,
+    Withheld, flight_table, motion_after, motion_text, short_motion_text, summarize, summarize_with_motion,
 };

@@ -18,7 +18,7 @@ macro_rules! document {
 }
 
 /// The manual is first.
-const DOCUMENTS: [Document; 28] = [
+const DOCUMENTS: [Document; 29] = [
     document!("docs/manual.md"),
     document!("docs/tutorial.md"),
     document!("docs/recordings.md"),
@@ -46,6 +46,7 @@ const DOCUMENTS: [Document; 28] = [
     document!("docs/experiments/regression_guard.md"),
     document!("docs/experiments/heading_in_an_orbit.md"),
     document!("docs/experiments/planned_motions.md"),
+    document!("docs/experiments/sigma_of_the_calibration.md"),
     document!("docs/experiments/archive.md"),
 ];
 

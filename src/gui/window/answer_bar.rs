@@ -9,7 +9,9 @@ use crate::gui::theme::{MAX_RUNS, Theme};
 use crate::gui::{Dialog, PanelContext, PanelName, findings};
 use crate::log_check::Trust;
 use crate::observability::laboratory::SufficientMotion;
-use crate::session::{Answer, Command, DiagnosisProgress, FindingSource, Recording, RunRecord, motion_text};
+use crate::session::{
+    Answer, Command, DiagnosisProgress, FindingSource, Recording, RunRecord, motion_text, short_motion_text,
+};
 
 /// Height of the bar in points.
 pub(super) const HEIGHT: f32 = 30.0;
@@ -50,9 +52,13 @@ pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, actions: &mut Vec<Acti
             let sentence = RichText::new(format!("{of_run}{text}")).size(SENTENCE_SIZE);
             let label = ui.add(Label::new(sentence.color(color).strong()).truncate());
             label.on_hover_text(hover_text(&answer));
-            let remedy = motion.map_or_else(|| answer.remedy.clone(), |it| motion_text(&it, &ctx.recording.rig));
+            let rig = &ctx.recording.rig;
+            let (remedy, whole) = match &motion {
+                Some(motion) => (short_motion_text(motion, rig), motion_text(motion, rig)),
+                None => (answer.remedy.clone(), answer.remedy.clone()),
+            };
             if pending.is_none() && !remedy.is_empty() && ui.available_width() > LEAST_REMEDY_WIDTH {
-                ui.add(Label::new(RichText::new(&remedy).color(theme.text)).truncate()).on_hover_text(&remedy);
+                ui.add(Label::new(RichText::new(&remedy).color(theme.text)).truncate()).on_hover_text(whole);
             }
         });
     });

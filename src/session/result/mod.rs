@@ -13,7 +13,7 @@ pub(in crate::session) mod truth;
 mod withheld;
 
 pub use answer::{Answer, FindingSource, Requirement, RunFinding};
-pub use motion::{motion_after, motion_text};
+pub use motion::{motion_after, motion_text, short_motion_text};
 pub use run_summary::{
     FrameCounts, RankSummary, RunSummary, StageSummary, TimingSummary, summarize, summarize_with_motion,
 };

@@ -26,6 +26,15 @@ pub fn motion_after(step: &StepRecord, rig: &Rig, camera_key: &str) -> Option<Su
 /// Number of moves that an instruction names.
 const NAMED: usize = 2;
 
+/// Instruction in few words: `Fly 12 s: 3 moves`, or the move if there is one.
+pub fn short_motion_text(motion: &SufficientMotion, rig: &Rig) -> String {
+    let moves = match motion.moves.as_slice() {
+        [(words, _)] => words.clone(),
+        moves => counted(moves.len(), "move"),
+    };
+    with_remaining(format!("Fly {:.0} s: {moves}", motion.duration_s()), motion, rig)
+}
+
 /// Instruction to fly a motion: `Fly 12 s: yaw gimbal ±16°, translate sideways ±0.46 m for 4 s, then … for 8 s`.
 pub fn motion_text(motion: &SufficientMotion, rig: &Rig) -> String {
     let named = motion.moves.iter().take(NAMED).map(|(words, duration_s)| {
@@ -34,7 +43,11 @@ pub fn motion_text(motion: &SufficientMotion, rig: &Rig) -> String {
     let further = motion.moves.len().saturating_sub(NAMED);
     let further = (further > 0).then(|| counted(further, "further move"));
     let moves: Vec<String> = named.chain(further).collect();
-    let text = format!("Fly {:.0} s: {}", motion.duration_s(), moves.join(", then "));
+    with_remaining(format!("Fly {:.0} s: {}", motion.duration_s(), moves.join(", then ")), motion, rig)
+}
+
+/// A text with the parameter that the motion leaves without the required accuracy.
+fn with_remaining(text: String, motion: &SufficientMotion, rig: &Rig) -> String {
     match motion.remaining {
         Some((parameter, sigma)) => {
             let name = rig.parameter_names().name(parameter);
