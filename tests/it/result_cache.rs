@@ -74,7 +74,7 @@ fn a_log_is_checked_once_for_all_commands() {
     let checked = |options: &[&str]| run(&cache, &[&["check", LOG], options].concat()).stdout;
     let (text, json) = (checked(&["--no-cache"]), checked(&["--no-cache", "--json"]));
     assert_eq!(entries(&cache).len(), 0);
-    run(&cache, &["run", LOG, "--duration", "1", "-o", out.to_str().unwrap()]);
+    run(&cache, &["run", LOG, "--duration", "4", "-o", out.to_str().unwrap()]);
     let entry = entries(&cache);
     assert_eq!((checked(&[]), checked(&["--json"])), (text, json));
     assert_eq!((entry.len(), entries(&cache)), (1, entry));

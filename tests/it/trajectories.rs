@@ -81,7 +81,7 @@ fn a_trajectory_is_evaluated_like_a_run() {
     let (code, text) = dcvins(&["report", &log, "--duration", "6", "-o", &report, "--trajectory", &file]);
     assert_eq!(code, 0, "{text}");
     let page = std::fs::read_to_string(folder.path().join("report/report.html")).unwrap();
-    assert!(page.contains("Trajectories of other programs") && page.contains("Other"), "the page lists it");
+    assert!(page.contains("All runs; errors after alignment") && page.contains("Other"), "the page lists it");
 }
 
 /// A sweep has a row for each trajectory, with the same errors as the run with the same poses.

@@ -195,7 +195,13 @@ impl Computation {
     /// Recomputes step `last` of a run and up to `max_count - 1` steps before it from the nearest snapshot of the
     /// estimator. Returns the steps with their indices in ascending order; empty for a step that has not been computed.
     pub fn recompute(&self, run: usize, last: usize, max_count: usize) -> Vec<(usize, StepRecord)> {
-        self.history(run).map_or_else(Vec::new, |history| history.recompute(last, max_count))
+        let mut steps = self.history(run).map_or_else(Vec::new, |history| history.recompute(last, max_count));
+        if let Some(run) = self.recording.runs.get(run) {
+            for (number, record) in &mut steps {
+                run.scale_as(*number, record);
+            }
+        }
+        steps
     }
 
     /// A complete step of a run, recomputed where only its summary is kept. The result is identical to the bit except
