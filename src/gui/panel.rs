@@ -12,6 +12,7 @@ use super::derived::slide::MovedChain;
 use super::theme::Theme;
 use crate::frontend::FeatureId;
 use crate::gimbal::{ParameterId, ParameterNames};
+use crate::observability::laboratory::SufficientMotion;
 use crate::observability::{ChainSlide, SlidePosition};
 use crate::session::breakpoints::Breakpoints;
 use crate::session::{
@@ -172,6 +173,11 @@ impl<'a> PanelContext<'a> {
     /// Calibration table of a run over the whole flight.
     pub(crate) fn flight(&self, ui: &Ui, run: &RunRecord) -> FlightReport {
         self.selection.flight.report(ui.ctx(), self.recording, run, &self.answer(run))
+    }
+
+    /// Motion that brings the parameters of a run to the required accuracy; `None` as long as none is needed or known.
+    pub(crate) fn motion(&self, ui: &Ui, run: &RunRecord) -> Option<Arc<SufficientMotion>> {
+        self.selection.flight.motion(ui.ctx(), self.recording, run, &self.answer(run))
     }
 
     /// Answer of a run: trust, cause and required accuracy.

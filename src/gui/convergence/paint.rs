@@ -173,8 +173,9 @@ impl<'a> PlotData<'a> {
             if *run == self.shown {
                 curves.band.update(area, epoch, stamps_ns, &parameter.lower, &parameter.upper);
                 let (epoch, stamps_ns) = (self.verdicts.epoch, &self.verdicts.stamps_ns);
+                let verdicts = self.verdicts.verdicts(id);
                 for (segments, verdict) in curves.verdicts.iter_mut().zip(MARKED) {
-                    segments.update(area, epoch, stamps_ns, |row| self.verdicts.verdict(id, Some(row)) == verdict);
+                    segments.update(area, epoch, stamps_ns, |row| verdicts.get(row) == Some(&verdict));
                 }
             }
         }

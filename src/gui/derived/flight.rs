@@ -5,16 +5,14 @@ use std::sync::{Arc, Mutex, PoisonError};
 use egui::Context;
 
 use super::follow::Follower;
-use super::step_advice::step_advice;
+use super::step_advice::{step_advice, step_motion};
 use super::step_work::{REPAINT, StepWork};
 use crate::gimbal::ParameterId;
 use crate::gui::parameter_names::place_of;
 use crate::observability::Determination;
 use crate::observability::laboratory::{Advice, SufficientMotion};
 use crate::sensors::RequiredAccuracy;
-use crate::session::{
-    Answer, FlightParameter, FlightVerdicts, Recording, RunRecord, StepRecord, Withheld, add_errors, motion_after,
-};
+use crate::session::{Answer, FlightParameter, FlightVerdicts, Recording, RunRecord, StepRecord, Withheld, add_errors};
 
 /// Calibration tables of all runs; clones share them.
 #[derive(Clone, Debug, Default)]
@@ -39,8 +37,6 @@ pub(crate) struct FlightReport {
     pub(crate) history: Arc<DeterminationHistory>,
     /// True if motions for the chain are still being computed.
     pub(crate) waits_for_advice: bool,
-    /// Motion that brings the parameters to the required accuracy, of a trusted run that has ended without reaching it.
-    pub(crate) motion: Option<Arc<SufficientMotion>>,
 }
 
 /// Ratio of σ and required accuracy, and verdict of each parameter at each step.
@@ -99,11 +95,37 @@ impl FlightTables {
         }
         let table = &mut runs[number];
         table.read(recording, run, answer.withheld(), self.in_background);
-        table.read_motion(recording, run, answer, self.in_background);
-        if table.report.waits_for_advice || table.motion.is_busy() {
+        if table.report.waits_for_advice {
             ctx.request_repaint_after(REPAINT);
         }
         table.report.clone()
+    }
+
+    /// Motion that brings the parameters of a trusted run to the required accuracy, when the run has ended without reaching
+    /// it and the suggested motions of its table are known.
+    pub(crate) fn motion(
+        &self,
+        ctx: &Context,
+        recording: &Recording,
+        run: &RunRecord,
+        answer: &Answer,
+    ) -> Option<Arc<SufficientMotion>> {
+        if !run.has_ended() || !answer.needs_motion() || self.report(ctx, recording, run, answer).waits_for_advice {
+            return None;
+        }
+        let number = recording.runs.iter().position(|other| other.id == run.id).unwrap_or(0);
+        let mut runs = self.runs.lock().unwrap_or_else(PoisonError::into_inner);
+        let table = runs.get_mut(number)?;
+        let step = table.verdicts.ranked_step()?;
+        table.motion.request(step, "motion", self.in_background, || {
+            let (step, rig, camera) = (Arc::clone(step), Arc::clone(&recording.rig), run.camera_key.clone());
+            move || step_motion(&step, &rig, &camera)
+        });
+        if table.motion.is_busy() {
+            ctx.request_repaint_after(REPAINT);
+        }
+        let (known, motion) = table.motion.last()?;
+        motion.filter(|_| Arc::ptr_eq(known, step)).cloned()
     }
 }
 
@@ -166,22 +188,6 @@ impl FlightTable {
     }
 }
 
-impl FlightTable {
-    /// Requests the motion that the parameters of a run still need when it has ended.
-    fn read_motion(&mut self, recording: &Recording, run: &RunRecord, answer: &Answer, in_background: bool) {
-        self.report.motion = None;
-        let needed = run.has_ended() && answer.needs_motion();
-        let Some(step) = self.verdicts.ranked_step().filter(|_| needed) else { return };
-        self.motion.request(step, "motion", in_background, || {
-            let (step, rig, camera) = (Arc::clone(step), Arc::clone(&recording.rig), run.camera_key.clone());
-            move || motion_after(&step, &rig, &camera).map(Arc::new)
-        });
-        if self.motion.has_result(step) {
-            self.report.motion = self.motion.last().and_then(|(_, motion)| motion).cloned();
-        }
-    }
-}
-
 impl DeterminationHistory {
     /// Appends a step that `verdicts` has just read.
     fn push(&mut self, step: &StepRecord, verdicts: &FlightVerdicts, required: &RequiredAccuracy) {
@@ -218,10 +224,15 @@ impl DeterminationHistory {
         shown
     }
 
+    /// Verdicts on a parameter by row; empty if it was never estimated.
+    pub(crate) fn verdicts(&self, parameter: ParameterId) -> &[Determination] {
+        let history = self.parameters.iter().find(|known| known.parameter == parameter);
+        history.map_or(&[], |history| &history.verdicts)
+    }
+
     /// Verdict on a parameter at a row; [`Determination::Initializing`] where it is not estimated.
     pub(crate) fn verdict(&self, parameter: ParameterId, row: Option<usize>) -> Determination {
-        let history = self.parameters.iter().find(|known| known.parameter == parameter);
-        let verdict = history.zip(row).and_then(|(history, row)| history.verdicts.get(row));
+        let verdict = row.and_then(|row| self.verdicts(parameter).get(row));
         verdict.copied().unwrap_or(Determination::Initializing)
     }
 
@@ -268,6 +279,7 @@ mod tests {
             for row in report.rows.iter() {
                 let of = history.parameters.iter().find(|it| it.parameter == row.parameter).unwrap();
                 assert_eq!(of.verdicts.last(), Some(&row.verdict), "{}", row.name);
+                assert_eq!(of.verdicts[0], Determination::Initializing, "{}", row.name);
                 let since = of.verdicts.iter().rposition(|verdict| *verdict != row.verdict).map_or(0, |it| it + 1);
                 assert_eq!(row.since_ns, Some(history.stamps_ns[since]), "{}", row.name);
             }

@@ -1,25 +1,28 @@
-//! Suggested excitation after a step, computed once for all panels that show it.
+//! Suggested excitation and motion after a step, computed once for all panels that show them.
 
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
-use crate::observability::laboratory::Advice;
+use crate::observability::laboratory::{Advice, SufficientMotion};
 use crate::sensors::Rig;
-use crate::session::{StepRecord, flight_advice};
+use crate::session::{StepRecord, flight_advice, motion_after};
 
-/// Steps whose advice is kept: the newest steps of a few runs, and those at the cursor.
+/// Steps whose results are kept: the newest steps of a few runs, and those at the cursor.
 const KEPT: usize = 16;
 
-/// Advice of the steps that were asked for last, the newest at the end.
-static KNOWN: Mutex<Vec<StepAdvice>> = Mutex::new(Vec::new());
+static ADVICE: StepResults<Advice> = StepResults(Mutex::new(Vec::new()));
+static MOTIONS: StepResults<SufficientMotion> = StepResults(Mutex::new(Vec::new()));
 
-struct StepAdvice {
+/// Results of the steps that were asked for last, the newest at the end.
+struct StepResults<T>(Mutex<Vec<StepResult<T>>>);
+
+struct StepResult<T> {
     step: Weak<StepRecord>,
     rig: Weak<Rig>,
     camera_key: String,
-    advice: Option<Arc<Advice>>,
+    result: Option<Arc<T>>,
 }
 
-impl StepAdvice {
+impl<T> StepResult<T> {
     fn is_of(&self, step: &Arc<StepRecord>, rig: &Arc<Rig>, camera_key: &str) -> bool {
         std::ptr::eq(self.step.as_ptr(), Arc::as_ptr(step))
             && std::ptr::eq(self.rig.as_ptr(), Arc::as_ptr(rig))
@@ -27,21 +30,43 @@ impl StepAdvice {
     }
 }
 
+impl<T> StepResults<T> {
+    /// Result for a step of a run with a rig's camera, computed the first time.
+    fn of(
+        &self,
+        step: &Arc<StepRecord>,
+        rig: &Arc<Rig>,
+        camera_key: &str,
+        compute: fn(&StepRecord, &Rig, &str) -> Option<T>,
+    ) -> Option<Arc<T>> {
+        let known = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(found) = known().iter().find(|it| it.is_of(step, rig, camera_key)) {
+            return found.result.clone();
+        }
+        // Without the lock: a thread of the pool may take up other work that asks for a result meanwhile.
+        let result = compute(step, rig, camera_key).map(Arc::new);
+        let mut known = known();
+        known.retain(|it| it.step.strong_count() > 0);
+        let surplus = (known.len() + 1).saturating_sub(KEPT);
+        known.drain(..surplus);
+        let (step, rig, camera_key) = (Arc::downgrade(step), Arc::downgrade(rig), camera_key.to_owned());
+        known.push(StepResult { step, rig, camera_key, result: result.clone() });
+        result
+    }
+}
+
 /// Suggested excitation for the chain after a step of a run with a rig's camera; `None` if no parameter is estimated.
 pub(in crate::gui) fn step_advice(step: &Arc<StepRecord>, rig: &Arc<Rig>, camera_key: &str) -> Option<Arc<Advice>> {
-    let known = || KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some(found) = known().iter().find(|it| it.is_of(step, rig, camera_key)) {
-        return found.advice.clone();
-    }
-    // Without the lock: a thread of the pool may take up other work that asks for advice meanwhile.
-    let advice = flight_advice(step, rig, camera_key).map(Arc::new);
-    let mut known = known();
-    known.retain(|it| it.step.strong_count() > 0);
-    let surplus = (known.len() + 1).saturating_sub(KEPT);
-    known.drain(..surplus);
-    let (step, rig, camera_key) = (Arc::downgrade(step), Arc::downgrade(rig), camera_key.to_owned());
-    known.push(StepAdvice { step, rig, camera_key, advice: advice.clone() });
-    advice
+    ADVICE.of(step, rig, camera_key, flight_advice)
+}
+
+/// Motion after a step of a run with a rig's camera that reaches the required accuracy; `None` if it is reached.
+pub(in crate::gui) fn step_motion(
+    step: &Arc<StepRecord>,
+    rig: &Arc<Rig>,
+    camera_key: &str,
+) -> Option<Arc<SufficientMotion>> {
+    MOTIONS.of(step, rig, camera_key, motion_after)
 }
 
 #[cfg(test)]

@@ -35,7 +35,7 @@ pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, actions: &mut Vec<Acti
         if let Some(progress) = &ctx.playback.diagnosis {
             progress_ui(ui, ctx.commands, progress, &theme);
         }
-        let motion = ctx.flight(ui, run).motion.filter(|_| pending.is_none());
+        let motion = if pending.is_none() { ctx.motion(ui, run) } else { None };
         if let Some(motion) = &motion {
             motion_ui(ui, ctx, motion);
         }
