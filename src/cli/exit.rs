@@ -46,7 +46,8 @@ pub(crate) const PLAIN: &str = "Exit codes: 0 success, 1 failure, 2 wrong use.";
 pub(crate) const INTERRUPTIBLE: &str = "Exit codes: 0 success, 1 failure, 2 wrong use, 130 interrupted (Ctrl+C; files \
     that are not complete are not written; a second Ctrl+C ends at once).";
 pub(crate) const RUN: &str = "Exit codes: 0 success, 1 failure, 2 wrong use, 3 a run never initialized, 5 the condition of \
-    --break became true, 7 a run does not reach the accuracy of --require, 130 interrupted (Ctrl+C; the steps so far are written; a second Ctrl+C ends at once).";
+    --break became true, 7 a run does not reach the accuracy of --require, 130 interrupted (Ctrl+C; the steps so far are \
+    written; a second Ctrl+C ends at once).";
 pub(crate) const REPORT: &str = "Exit codes: 0 success, 1 failure, 2 wrong use, 3 a run never initialized, 130 \
     interrupted (Ctrl+C; the steps so far are written; a second Ctrl+C ends at once).";
 pub(crate) const SWEEP: &str = "Exit codes: 0 success, 1 failure, worse than the baseline, or jobs that have not run, 2 wrong \

@@ -1,4 +1,4 @@
-//! What a finding about a run is about: the panel that shows it, the parameter, and the time.
+//! Panel, parameter and time of a finding about a run, and its text.
 
 use super::{PanelContext, PanelName};
 use crate::faults::{Area, FaultKind};

@@ -6,7 +6,7 @@ use serde::{Serialize, Serializer};
 
 use super::answer::Answer;
 use super::motion::{motion_after, motion_text};
-use super::withheld::flight_table;
+use super::withheld::table_with;
 use crate::calibration::ChainDistance;
 use crate::estimator::{Phase, Stage, StageTimes};
 use crate::geometry::seconds_from_ns;
@@ -186,10 +186,12 @@ pub fn summarize(recording: &Recording, run: &RunRecord, timing: bool) -> RunSum
         Err(_) if estimated.is_empty() => (None, Some(never_initialized(run))),
         Err(reason) => (None, Some(reason)),
     };
+    let answer = Answer::of_run(recording, run);
     RunSummary {
         log: log_name(&recording.log_path),
         run: run.spec.to_string(),
-        answer: Answer::of_run(recording, run),
+        calibration: calibration(recording, run, &answer),
+        answer,
         camera: run.last_camera_keys().join(", "),
         frames: FrameCounts {
             total: run.steps.len(),
@@ -201,7 +203,6 @@ pub fn summarize(recording: &Recording, run: &RunRecord, timing: bool) -> RunSum
         length_m,
         accuracy,
         accuracy_missing,
-        calibration: calibration(recording, run),
         rank: rank(recording, run),
         timing_ms: if timing { timing_summary(run) } else { None },
         real_time_factor: if timing { real_time_factor(run) } else { None },
@@ -223,7 +224,7 @@ fn never_initialized(run: &RunRecord) -> String {
 /// Reasons of a run that never initialized that are named.
 const WAITING_REASONS: usize = 3;
 
-fn calibration(recording: &Recording, run: &RunRecord) -> CalibrationSummary {
+fn calibration(recording: &Recording, run: &RunRecord, answer: &Answer) -> CalibrationSummary {
     let Some(last) = run.steps.last().map(|step| &step.report.calibration) else {
         return CalibrationSummary {
             parameterization: run.spec.parameterization.name().to_owned(),
@@ -271,7 +272,7 @@ fn calibration(recording: &Recording, run: &RunRecord) -> CalibrationSummary {
         columns: last.parameters.len(),
         sigma_scale: last.sigma_scale,
         parameters,
-        estimability: flight_table(recording, run),
+        estimability: table_with(recording, run, answer),
         chain_error: chain_error(&last.classical),
         chain_error_initial: given.as_ref().and_then(chain_error),
     }

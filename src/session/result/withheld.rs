@@ -49,8 +49,13 @@ impl Withheld {
 
 /// Calibration table of a run after its last step: the same for window, report and files.
 pub fn flight_table(recording: &Recording, run: &RunRecord) -> Vec<FlightParameter> {
+    table_with(recording, run, &Answer::of_run(recording, run))
+}
+
+/// The same for a run whose answer is known.
+pub(super) fn table_with(recording: &Recording, run: &RunRecord, answer: &Answer) -> Vec<FlightParameter> {
     let mut rows = flight_rows(recording, run);
-    if let Some(withheld) = Answer::of_run(recording, run).withheld() {
+    if let Some(withheld) = answer.withheld() {
         withheld.apply(&mut rows);
     }
     rows

@@ -22,6 +22,20 @@ fn with_verdict(rows: &[FlightParameter], wanted: Determination) -> Vec<Paramete
     rows.iter().filter(|row| row.verdict == wanted).map(|row| row.parameter).collect()
 }
 
+/// Finding without a fault that a fork corrects.
+fn warning(area: Area, title: &str) -> Finding {
+    Finding {
+        severity: Severity::Warning,
+        area,
+        title: title.to_owned(),
+        evidence: String::new(),
+        remedy: "mount it softly".to_owned(),
+        interval: FindingInterval::default(),
+        is_assumption: false,
+        faults: Vec::new(),
+    }
+}
+
 /// Also by the ratio of σ and prior σ, as a check that the looser prior makes this ratio smaller.
 #[test]
 fn a_looser_prior_determines_no_further_parameter() {
@@ -82,17 +96,7 @@ fn verdicts_of_a_run_that_is_not_trusted_are_withheld() {
     let run = recorded(&flight, "auto");
     let trusted = Answer::of(&flight.given_rig, &[], &run);
     assert_eq!(trusted.withheld(), None, "{trusted:?}");
-    let finding = Finding {
-        severity: Severity::Warning,
-        area: Area::Imu,
-        title: "the accelerometer is saturated".to_owned(),
-        evidence: String::new(),
-        remedy: "mount it softly".to_owned(),
-        interval: FindingInterval::default(),
-        is_assumption: false,
-        faults: Vec::new(),
-    };
-    let doubtful = Answer::of(&flight.given_rig, &[finding], &run);
+    let doubtful = Answer::of(&flight.given_rig, &[warning(Area::Imu, "the accelerometer is saturated")], &run);
     let withheld = doubtful.withheld().expect("a warning about the IMU");
     let mut rows = table(&flight, &run);
     assert!(!with_verdict(&rows, Determination::Determined).is_empty());
@@ -127,17 +131,7 @@ fn a_cause_comes_before_residuals_that_are_worse() {
     camera.model.intrinsics_px[0] *= 1.3;
     camera.model.intrinsics_px[1] *= 1.3;
     let run = recorded(&flight, "auto");
-    let finding = |area: Area| Finding {
-        severity: Severity::Warning,
-        area,
-        title: "imu0 is stamped on arrival".to_owned(),
-        evidence: String::new(),
-        remedy: String::new(),
-        interval: FindingInterval::default(),
-        is_assumption: false,
-        faults: Vec::new(),
-    };
-    let of = |area| Answer::of(&flight.given_rig, &[finding(area)], &run);
+    let of = |area| Answer::of(&flight.given_rig, &[warning(area, "imu0 is stamped on arrival")], &run);
     let alone = Answer::of(&flight.given_rig, &[], &run);
     let by_cause = of(Area::Time);
     assert_eq!(by_cause.trust, alone.trust);

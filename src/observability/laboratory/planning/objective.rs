@@ -93,10 +93,14 @@ impl Objective {
         Self { start: self.excitable.tr_mul(&(information * &self.excitable)), ..self.clone() }
     }
 
+    /// Information along the observable directions (k × k) after this much more (n × n, in column units).
+    fn information(&self, gained: &DMatrix<f64>) -> DMatrix<f64> {
+        &self.start + self.excitable.tr_mul(&(gained * &self.excitable))
+    }
+
     /// Covariance of the columns (n × n, in column units) after this much information.
     fn covariance(&self, gained: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-        let information = &self.start + self.excitable.tr_mul(&(gained * &self.excitable));
-        let inverse = information.cholesky()?.inverse();
+        let inverse = self.information(gained).cholesky()?.inverse();
         Some(&self.excitable * inverse * self.excitable.transpose())
     }
 
@@ -121,8 +125,7 @@ impl Objective {
 
     /// σ of every column after this much information, without the part of the prior, in column units.
     pub(super) fn sigmas_without_prior(&self, gained: &DMatrix<f64>) -> Option<Vec<f64>> {
-        let information = &self.start + self.excitable.tr_mul(&(gained * &self.excitable));
-        let [factor, prior] = [information, self.prior.clone()]
+        let [factor, prior] = [self.information(gained), self.prior.clone()]
             .map(|information| information.cholesky().map(|cholesky| cholesky.l().transpose()));
         Some(sigmas_without_prior(&factor?, &prior?, &self.excitable))
     }
