@@ -37,7 +37,7 @@ pub struct SessionRequest {
     pub truth_trajectory: Option<TrajectorySource>,
     /// Lever arm of the antenna whose positions are the ground truth, instead of the rig's `ground_truth.lever_arm`.
     pub lever_arm: Option<LeverArm>,
-    /// Required accuracy instead of the rig's, as in [`RequiredAccuracy::with`].
+    /// Required accuracy instead of the rig's, as in [`RequiredAccuracy::with`](crate::sensors::RequiredAccuracy::with).
     pub required_accuracy: Option<String>,
     /// Calibration of earlier flights that the runs start from.
     pub prior: Option<Arc<FlightPrior>>,
