@@ -101,6 +101,12 @@ class Runs(unittest.TestCase):
         self.assertEqual(stopped["run"], "auto")
         self.assertGreater(stopped["values"]["features"], 3)
 
+    def test_a_required_accuracy_is_compared(self):
+        loose = dcvins.run(LOG, duration=DURATION_S, require="translation=1m,rotation=90deg")["auto"]
+        self.assertIn("within 1000 mm and 90°", loose.answer)
+        with self.assertRaisesRegex(dcvins.DcvinsError, "is no positive number"):
+            dcvins.run(LOG, require="translation=0mm")
+
     def test_frames_need_pandas(self):
         table = self.results["auto"].verdicts
         self.assertEqual(list(table.frame()["name"]), table["name"].tolist())

@@ -15,8 +15,9 @@ from ._trajectory import Trajectory
 if TYPE_CHECKING:
     import numpy
 
-#: Exit codes of `dcvins run` with complete files: success, a run never initialized, a condition became true.
-_WITH_FILES = (0, 3, 5)
+#: Exit codes of `dcvins run` with complete files: success, a run never initialized, a condition became true, a run does
+#: not reach the required accuracy.
+_WITH_FILES = (0, 3, 5, 7)
 #: Tables of a run, without the extension .csv.
 _TABLES = ("calibration", "covariance", "rank", "information", "frames")
 
@@ -200,6 +201,7 @@ def run(
     duration: Optional[float] = None,
     trajectories: Union[str, Sequence[StrPath]] = (),
     stop_when: Optional[str] = None,
+    require: Union[str, bool] = False,
     timing: bool = True,
     mcap: bool = False,
     euroc: bool = False,
@@ -209,8 +211,9 @@ def run(
 
     `runs` are up to four specifications such as `"auto"` or `"minimal:encoder=off,name=free"` (docs/commands.md, Run
     specifications). `out` receives one folder per run; without it the files are in a temporary folder that lives as long
-    as the result. `stop_when` is the condition of `--break`, `timing=False` omits measured times, so that two runs give
-    the same bytes. A run that never initialized is a result with `initialized` false.
+    as the result. `stop_when` is the condition of `--break`, `require` the accuracy of `--require`, such as
+    `"translation=5mm,rotation=0.1deg"`, or `True` for the accuracy of the rig; `Run.answer` then says whether it is reached.
+    `timing=False` omits measured times, so that two runs give the same bytes. A run that never initialized is a result with `initialized` false.
     """
     specifications = texts(runs) or []
     arm = lever_arm if lever_arm is None or isinstance(lever_arm, str) else ",".join(map(str, lever_arm))
@@ -230,7 +233,15 @@ def run(
     given = {**log_options, "trajectory": log_options["trajectories"]}
     del given["trajectories"]
     arguments = options(
-        **given, run=specifications, out=folder, break_=stop_when, no_timing=not timing, mcap=mcap, euroc=euroc, force=force
+        **given,
+        run=specifications,
+        out=folder,
+        break_=stop_when,
+        require=require,
+        no_timing=not timing,
+        mcap=mcap,
+        euroc=euroc,
+        force=force,
     )
     printed = call_json(["run", text(log), *arguments], _WITH_FILES)
     summaries = printed["runs"] if isinstance(printed, dict) else printed
