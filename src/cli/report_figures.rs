@@ -7,10 +7,10 @@ use dcvins::export::{ScreenshotOptions, draw_panel, draw_panel_svg, png_bytes};
 use dcvins::flight_log::ImageReader;
 use dcvins::geometry::{ns_from_seconds, seconds_from_ns};
 use dcvins::gimbal::ParameterId;
-use dcvins::gui::PanelName;
 use dcvins::gui::comparison::ComparisonView;
 use dcvins::gui::theme::ThemeName;
 use dcvins::gui::window::{FigureContent, FigureText, figure_height};
+use dcvins::gui::{PanelName, Presentation};
 use dcvins::report::{ReportDrawing, ReportFigure};
 use dcvins::session::{Computation, Recording, SessionPlan};
 use dcvins::text::Named as _;
@@ -75,6 +75,7 @@ pub(crate) fn draw(at_s: &[f64], plan: &SessionPlan, computation: &mut Computati
                 pixels_per_point: scale as f32,
                 theme: ThemeName::Print,
                 run: figure.run,
+                presentation: Presentation::FigureOfReport,
                 ..ScreenshotOptions::default()
             };
             let drawing = if figure.is_plot() {
@@ -96,7 +97,7 @@ fn wanted(recording: &Recording, panel: PanelName, view: Option<ComparisonView>,
     let content = FigureContent { panel, view, recording, run, range_ns: (0, recording.last_stamp_ns()), cursor_ns };
     let half = matches!(panel, PanelName::Image | PanelName::Scene);
     let width = if half { WIDTH / 2 } else { WIDTH };
-    let height = figure_height(&content, width as f32).min(MAX_HEIGHT) as u32;
+    let height = figure_height(&content, Presentation::FigureOfReport, width as f32).min(MAX_HEIGHT) as u32;
     Wanted { panel, view, run, height, half, text: FigureText::of(&content) }
 }
 

@@ -113,6 +113,8 @@ pub enum Presentation {
     Figure,
     /// The same of a time range: without the line of the cursor.
     FigureOfRange,
+    /// A figure in a report, whose text has the verdicts: plots without the sentences about them.
+    FigureOfReport,
 }
 
 impl Presentation {

@@ -6,11 +6,11 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use super::inputs::InputFile;
+use super::observability::{Observability, observability};
 use super::rank_intervals::{RankInterval, rank_intervals};
-use super::verdict::{RunVerdict, Statement, last_position_sigma_m, log_statement};
 use crate::geometry::{median, seconds_from_ns};
 use crate::log_check::CheckReport;
-use crate::session::{FlightParameter, PoseError, Recording, RunRecord, RunSummary, WarningLine, log_warning_lines};
+use crate::session::{PoseError, Recording, RunRecord, RunSummary, WarningLine, log_warning_lines};
 use crate::table::Medium::Page;
 use crate::text::log_name;
 
@@ -37,8 +37,8 @@ impl ReportEvent {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(super) struct RunContent {
     pub(super) label: String,
-    /// The verdict at the top of the page.
-    pub(super) verdict: RunVerdict,
+    /// `None` without a rank analysis.
+    pub(super) observability: Option<Observability>,
     pub(super) summary: RunSummary,
     /// Standard deviation of the last position in metres, relative to the first estimated frame.
     pub(super) position_sigma_m: Option<f64>,
@@ -46,8 +46,6 @@ pub(super) struct RunContent {
     pub(super) nees: Option<f64>,
     /// Median over the frames of the RMS of the reprojection residuals after the solve.
     pub(super) reprojection_px: Option<f64>,
-    /// Calibration table, equal to the summary's.
-    pub(super) estimability: Vec<FlightParameter>,
     #[serde(rename = "rank_story")]
     pub(super) rank_intervals: Vec<RankInterval>,
     pub(super) events: Vec<ReportEvent>,
@@ -66,7 +64,9 @@ pub(super) struct ReportContent {
     pub(super) duration_s: f64,
     /// Input files with their hashes.
     pub(super) inputs: Vec<InputFile>,
-    pub(super) log_verdict: Statement,
+    /// True if the errors are distances to a batch reference.
+    #[serde(skip)]
+    pub(super) truth_is_batch: bool,
     /// Runs in the order of the command line.
     pub(super) runs: Vec<RunContent>,
     /// Findings about the log and its rig, as printed by `check --json`.
@@ -86,11 +86,10 @@ impl ReportContent {
             let (events, frequent_events) = events(run);
             RunContent {
                 label: run.spec.label.clone(),
-                verdict: RunVerdict::new(recording, run, &summary),
+                observability: observability(recording, run),
                 position_sigma_m: last_position_sigma_m(run),
                 nees: PoseError::mean_nees(&run.pose_errors()),
                 reprojection_px: reprojection_px(run),
-                estimability: summary.calibration.estimability.clone(),
                 summary,
                 rank_intervals: rank_intervals(run, &recording.rig),
                 events,
@@ -106,12 +105,18 @@ impl ReportContent {
             rig: recording.rig.name.clone(),
             duration_s: seconds_from_ns(recording.duration_ns),
             inputs,
-            log_verdict: log_statement(options.check.as_ref(), &log_warnings),
+            truth_is_batch: recording.truth_is_batch,
             runs: runs.collect(),
             check: options.check.clone(),
             log_warnings,
         }
     }
+}
+
+/// Standard deviation of the last position with a covariance, in metres.
+fn last_position_sigma_m(run: &RunRecord) -> Option<f64> {
+    let covariance = run.steps.iter().rev().find_map(|step| step.report.newest_pose_covariance)?;
+    Some(covariance.position_sigma_m())
 }
 
 fn reprojection_px(run: &RunRecord) -> Option<f64> {

@@ -5,7 +5,7 @@ use base64::engine::general_purpose::STANDARD;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::content::{ReportDrawing, ReportFigure};
-use super::verdict::StatementLevel;
+use crate::log_check::Severity;
 use crate::table::{Column, Medium};
 
 /// Maximum number of rows of a table that is not split between printed pages.
@@ -126,13 +126,13 @@ pub(super) fn figure(number: usize, figure: &ReportFigure) -> Markup {
     }
 }
 
-/// The icon of a mark, drawn in the page so that it needs no symbol font.
-pub(super) fn icon(mark: StatementLevel) -> Markup {
-    let svg = match mark {
-        StatementLevel::Good => include_str!("../../assets/report/icons/good.svg"),
-        StatementLevel::Note => include_str!("../../assets/report/icons/note.svg"),
-        StatementLevel::Warning => include_str!("../../assets/report/icons/warning.svg"),
-        StatementLevel::Error => include_str!("../../assets/report/icons/error.svg"),
+/// The icon of a severity, drawn in the page so that it needs no symbol font.
+pub(super) fn icon(severity: Severity) -> Markup {
+    let svg = match severity {
+        Severity::Good => include_str!("../../assets/report/icons/good.svg"),
+        Severity::Note => include_str!("../../assets/report/icons/note.svg"),
+        Severity::Warning => include_str!("../../assets/report/icons/warning.svg"),
+        Severity::Error => include_str!("../../assets/report/icons/error.svg"),
     };
     PreEscaped(svg.trim_end().to_owned())
 }

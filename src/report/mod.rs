@@ -5,11 +5,11 @@
 mod content;
 mod html;
 mod inputs;
+mod observability;
 mod page;
 mod rank_intervals;
 mod study;
 mod tables;
-mod verdict;
 
 use std::fs;
 use std::path::{Path, PathBuf};

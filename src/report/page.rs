@@ -6,19 +6,19 @@ use super::content::{ReportContent, ReportEvent, ReportFigure, RunContent};
 use super::html::{document, figure, icon, list, list_in_columns, unbroken};
 use super::rank_intervals::RankInterval;
 use super::tables;
-use super::verdict::{OBSERVABILITY, Statement, StatementLevel};
-use crate::log_check::Trust;
+use crate::log_check::{Severity, Trust};
+use crate::observability::Determination;
 use crate::session::FlightParameter;
 use crate::table::Medium::Page;
 use crate::table::distinct;
-use crate::text::Named as _;
+use crate::text::{Named as _, counted};
 
 pub(super) fn page(content: &ReportContent, figures: &[ReportFigure]) -> String {
     let title = format!("Flight report: {}", content.log);
     let body = html! {
         h1 { (title) }
-        @for run in &content.runs {
-            (answer(content, run))
+        @for alike in content.runs.chunk_by(|one, next| one.summary.answer.remedy == next.summary.answer.remedy) {
+            (answers(content, alike))
         }
         p.lead { (lead(content)) }
         (contents(content))
@@ -57,25 +57,36 @@ pub(super) fn page(content: &ReportContent, figures: &[ReportFigure]) -> String 
     format!("{}\n", document(&title, &body))
 }
 
-/// Answer of a run: trust, cause and required accuracy in one sentence, and what to do first.
+/// Answers of consecutive runs with one remedy.
+fn answers(content: &ReportContent, runs: &[RunContent]) -> Markup {
+    let remedy = runs.first().map_or("", |run| run.summary.answer.remedy.as_str());
+    html! {
+        p.answer {
+            @for (place, run) in runs.iter().enumerate() {
+                @if place > 0 { br; }
+                (answer(content, run))
+            }
+            @if !remedy.is_empty() { br; "Remedy: " (remedy) }
+        }
+    }
+}
+
+/// Answer of a run: trust, cause and required accuracy in one sentence.
 fn answer(content: &ReportContent, run: &RunContent) -> Markup {
     let found = &run.summary.answer;
     let unmet = found.requirement.as_ref().is_some_and(|it| it.met < it.parameters);
     let level = match found.trust {
-        Trust::NotUsable => StatementLevel::Error,
-        Trust::Doubtful => StatementLevel::Warning,
-        Trust::Trusted if unmet => StatementLevel::Warning,
-        Trust::Trusted => StatementLevel::Good,
+        Trust::NotUsable => Severity::Error,
+        Trust::Doubtful => Severity::Warning,
+        Trust::Trusted if unmet => Severity::Warning,
+        Trust::Trusted => Severity::Good,
     };
     // Not every font has the symbol of the sentence.
     let sentence = found.sentence.split_once(' ').map_or(found.sentence.as_str(), |(_, words)| words);
     html! {
-        p.answer {
-            @if content.runs.len() > 1 { (run.label) ": " }
-            (icon(level)) " "
-            strong { (unbroken(sentence)) }
-            @if !found.remedy.is_empty() { br; "Remedy: " (found.remedy) }
-        }
+        @if content.runs.len() > 1 { (run.label) ": " }
+        (icon(level)) " "
+        strong { (unbroken(sentence)) }
     }
 }
 
@@ -96,11 +107,19 @@ fn lead(content: &ReportContent) -> String {
     )
 }
 
-/// Findings about log and rig in one sentence; their section has them all.
+/// Number of findings about log and rig; their section has them all.
 fn log_verdict(content: &ReportContent) -> Markup {
-    let Statement { topic, mark, text, .. } = &content.log_verdict;
+    let findings = content.check.iter().flat_map(|check| &check.findings);
+    let severities: Vec<Severity> = findings
+        .map(|finding| finding.severity)
+        .chain(content.log_warnings.iter().map(|_| Severity::Warning))
+        .collect();
+    let worst = severities.iter().max().copied().unwrap_or(Severity::Good);
+    let count = |of: Severity, noun: &str| counted(severities.iter().filter(|severity| **severity == of).count(), noun);
+    let counts = [(Severity::Error, "error"), (Severity::Warning, "warning"), (Severity::Note, "note")];
+    let [errors, warnings, notes] = counts.map(|(severity, noun)| count(severity, noun));
     html! {
-        p { (icon(*mark)) " " (topic) ": " (text) }
+        p { (icon(worst)) " Log and rig: " (errors) ", " (warnings) " and " (notes) "." }
     }
 }
 
@@ -109,7 +128,7 @@ fn contents(content: &ReportContent) -> Markup {
         nav {
             ul {
                 li { a href="#results" { "Results" } }
-                @if content.runs.iter().any(|run| !run.estimability.is_empty()) {
+                @if content.runs.iter().any(|run| !run.summary.calibration.estimability.is_empty()) {
                     " " li { a href="#calibration" { "Calibration" } }
                 }
                 @for (index, run) in content.runs.iter().enumerate() {
@@ -145,13 +164,13 @@ fn grouped(figures: &[ReportFigure]) -> Markup {
 
 fn run_section(index: usize, run: &RunContent) -> Markup {
     let frequent: Vec<String> = run.frequent_events.iter().map(|(kind, count)| format!("{kind} {count}")).collect();
-    let why = why_lines(&run.estimability);
+    let why = why_lines(&run.summary.calibration.estimability);
     let events: Vec<String> = run.events.iter().map(ReportEvent::sentence).collect();
     html! {
         h2 id={ "run-" (index) } { "Run " (run.label) }
-        @for statement in run.verdict.statements.iter().filter(|statement| statement.topic == OBSERVABILITY) {
-            p { (icon(statement.mark)) " " (unbroken(&statement.text)) }
-            (list_in_columns(&statement.details))
+        @if let Some(found) = &run.observability {
+            p { (icon(found.severity)) " " (unbroken(&found.text)) }
+            (list_in_columns(&found.details))
         }
         @if !why.is_empty() {
             h3 { "Parameters that the flight alone does not determine" }
@@ -168,19 +187,28 @@ fn run_section(index: usize, run: &RunContent) -> Markup {
 }
 
 /// Reasons of the verdicts on parameters that the flight alone does not determine, with the time since when they hold; one
-/// line for each motion or run that helps.
+/// line for each motion or run that helps, and all redundant parameters with the same start in one.
 fn why_lines(parameters: &[FlightParameter]) -> Vec<String> {
     let explained = || parameters.iter().filter(|parameter| !parameter.reason.is_empty());
-    let reason = |parameter: &FlightParameter| {
+    let verdict = |parameter: &FlightParameter| {
         let since =
             parameter.since_s().map_or_else(String::new, |since_s| format!(" since {} s", Page.fixed(since_s, 2)));
-        format!("{}, {}{since}: {}", parameter.name, parameter.verdict.name(), parameter.reason)
+        format!("{}{since}", parameter.verdict.name())
     };
     let remedies = distinct(explained().map(|parameter| parameter.remedy.as_str()));
     let line = |remedy: &str| {
-        let reasons: Vec<String> = explained().filter(|it| it.remedy == remedy).map(reason).collect();
+        let of_remedy: Vec<&FlightParameter> = explained().filter(|it| it.remedy == remedy).collect();
+        let alike = of_remedy.chunk_by(|a, b| a.verdict == Determination::Redundant && verdict(a) == verdict(b));
+        let reasons = alike.map(|parameters| match parameters {
+            [parameter] => format!("{}, {}: {}", parameter.name, verdict(parameter), parameter.reason),
+            _ => {
+                let named = parameters.iter().map(|it| format!("{} ({})", it.name, it.reason));
+                let verdict = parameters.first().map(|first| verdict(first)).unwrap_or_default();
+                format!("{verdict}: {}", named.collect::<Vec<_>>().join(", "))
+            }
+        });
         let helps = if remedy.is_empty() { String::new() } else { format!(" · {remedy}") };
-        format!("{}{helps}", reasons.join("; "))
+        format!("{}{helps}", reasons.collect::<Vec<_>>().join("; "))
     };
     remedies.into_iter().map(line).collect()
 }

@@ -5,13 +5,20 @@ use maud::{Markup, html};
 use super::InputFile;
 use super::content::{ReportContent, RunContent};
 use super::html::{icon, table, table_of_texts};
-use super::verdict::{StatementLevel, chain_error};
+use crate::calibration::ChainDistance;
 use crate::log_check::{CheckReport, Finding, Severity, TopicReport};
 use crate::observability::Determination;
 use crate::session::{CalibrationRow, FrameCounts, TrajectoryAccuracy, TrajectoryLane};
 use crate::table::Medium::Page;
 use crate::table::{Cell, Column, Tone, distinct};
 use crate::text::Named as _;
+
+/// Caption of the table of results.
+const RESULTS: &str = "All runs; errors after alignment by yaw and position (RMSE)";
+/// Its caption with the trajectory of `calibrate` instead of a ground truth.
+const AGAINST_BATCH: &str = "All runs; errors after alignment by yaw and position (RMSE) are distances to the batch \
+                             reference (dcvins calibrate --trajectory), which uses the same measurements and is not an \
+                             independent ground truth";
 
 /// Run of the program, or trajectory of another one, in the table of results.
 struct ResultColumn<'a> {
@@ -47,7 +54,8 @@ impl<'a> ResultColumn<'a> {
     fn ate_text(&self) -> Option<String> {
         let missing = || self.missing.map(str::to_owned);
         let text = |found: &TrajectoryAccuracy| {
-            format!("{} ({} %)", Page.fixed(found.ate_rmse_m, 4), Page.fixed(found.ate_percent_of_length, 2))
+            let [rmse_m, largest_m] = [found.ate_rmse_m, found.ate_max_m].map(|error_m| Page.fixed(error_m, 4));
+            format!("{rmse_m} ({} %), max {largest_m}", Page.fixed(found.ate_percent_of_length, 2))
         };
         self.accuracy.map(text).or_else(missing)
     }
@@ -81,14 +89,10 @@ pub(super) fn runs(content: &ReportContent) -> Markup {
     let mut rows = vec![
         Row::page("trust", |it| it.run.map(|run| run.summary.answer.trust.name())),
         Row::page("within the required accuracy", ResultColumn::requirement_text),
-        Row::page("position error (ATE, RMSE), m (% of path)", ResultColumn::ate_text),
-        Row::page("its median and maximum, m", |it| {
-            let found = it.accuracy?;
-            Some(format!("{}, {}", Page.fixed(found.ate_median_m, 4), Page.fixed(found.ate_max_m, 4)))
-        }),
+        Row::page("position error (ATE), m (% of path)", ResultColumn::ate_text),
     ];
     rows.extend(lengths_m.into_iter().map(|length_m| {
-        Row::page(format!("relative error over {length_m} m (RPE, RMSE)"), move |it| {
+        Row::page(format!("relative error over {length_m} m (RPE)"), move |it| {
             let relative = it.accuracy?.rpe.iter().find(|relative| relative.delta_m == length_m)?;
             let (translation_m, rotation_deg) = (relative.translation_rmse_m, relative.rotation_rmse_deg);
             Some(format!("{} m, {}°", Page.fixed(translation_m, 3), Page.fixed(rotation_deg, 2)))
@@ -97,7 +101,7 @@ pub(super) fn runs(content: &ReportContent) -> Markup {
     rows.extend([
         Row::page("σ of the last position, m", move |it| decimals(it.run?.position_sigma_m, 4)),
         Row::page("NEES (6 when consistent)", move |it| decimals(it.run?.nees, 1)),
-        Row::page("factor on σ by the run's consistency", move |it| {
+        Row::page("factor on σ by consistency", move |it| {
             decimals(it.run.map(|run| run.summary.calibration.sigma_scale), 2)
         }),
         Row::page("extrinsics error by the rig", |it| {
@@ -108,9 +112,6 @@ pub(super) fn runs(content: &ReportContent) -> Markup {
         }),
         Row::page("reprojection RMS, median, px", move |it| decimals(it.run?.reprojection_px, 2)),
         Row::page("estimated frames", ResultColumn::frames_text),
-        Row::page("keyframes, restarts", |it| {
-            it.run.map(|run| format!("{}, {}", run.summary.frames.keyframes, run.summary.frames.restarts))
-        }),
         Row::page("informed rank at the end", |it| {
             let rank = it.run?.summary.rank.as_ref()?;
             Some(format!("{} of {}", rank.rank_informed, rank.columns))
@@ -119,7 +120,7 @@ pub(super) fn runs(content: &ReportContent) -> Markup {
             let length_m = it.run.map(|run| run.summary.length_m).or_else(|| it.lane.map(|lane| lane.length_m));
             length_m.map(|length_m| Page.fixed(length_m, 1))
         }),
-        Row::page("camera, parameterization; or file", |it| {
+        Row::page("camera, parameterization or file", |it| {
             let of_run =
                 |run: &RunContent| format!("{}, {}", run.summary.camera, run.summary.calibration.parameterization);
             it.run.map(of_run).or_else(|| it.lane.map(|lane| lane.source.clone()))
@@ -133,12 +134,21 @@ pub(super) fn runs(content: &ReportContent) -> Markup {
     });
     let texts: Vec<Vec<String>> = texts.collect();
     let headings = std::iter::once("").chain(results.iter().map(|result| result.label));
-    table_of_texts("All runs; errors after alignment by yaw and position", headings, &texts)
+    table_of_texts(if content.truth_is_batch { AGAINST_BATCH } else { RESULTS }, headings, &texts)
+}
+
+/// For example `1.6 mm, 0.05°`.
+fn chain_error(error: &ChainDistance) -> String {
+    format!(
+        "{} mm, {}°",
+        Page.fixed(error.translation_mean_m * 1e3, 1),
+        Page.fixed(error.rotation_mean_rad.to_degrees(), 2)
+    )
 }
 
 /// Calibration parameters as rows, with the columns of each run side by side; `None` without calibration.
 pub(super) fn calibration(runs: &[RunContent]) -> Option<Markup> {
-    let calibrated: Vec<_> = runs.iter().filter(|run| !run.estimability.is_empty()).collect();
+    let calibrated: Vec<_> = runs.iter().filter(|run| !run.summary.calibration.estimability.is_empty()).collect();
     calibrated.first()?;
     let rows: Vec<Vec<CalibrationRow<'_>>> = calibrated.iter().map(|run| rows_of(run)).collect();
     let mut columns = CalibrationRow::columns();
@@ -204,7 +214,7 @@ fn of_several_runs<'a>() -> Vec<Column<'a, CalibrationRow<'a>>> {
 
 fn rows_of(run: &RunContent) -> Vec<CalibrationRow<'_>> {
     let summary = |name: &str| run.summary.calibration.parameters.iter().find(|it| it.name == name);
-    let rows = run.estimability.iter();
+    let rows = run.summary.calibration.estimability.iter();
     rows.map(|flight| CalibrationRow { flight, summary: summary(&flight.name), waits_for_advice: false }).collect()
 }
 
@@ -237,11 +247,11 @@ fn calibration_row<'a>(
 }
 
 /// Icon of a tone that judges.
-fn mark_of(tone: Tone) -> Option<StatementLevel> {
+fn mark_of(tone: Tone) -> Option<Severity> {
     match tone {
-        Tone::Good => Some(StatementLevel::Good),
-        Tone::Caution => Some(StatementLevel::Warning),
-        Tone::Bad => Some(StatementLevel::Error),
+        Tone::Good => Some(Severity::Good),
+        Tone::Caution => Some(Severity::Warning),
+        Tone::Bad => Some(Severity::Error),
         Tone::Strong | Tone::Plain | Tone::Weak | Tone::Accent => None,
     }
 }

@@ -32,7 +32,7 @@ use super::plot::{
 };
 use super::theme::{CURVE_WIDTH, RunStyle, Theme};
 use super::widgets::empty_ui;
-use super::{CsvTable, Panel, PanelContext};
+use super::{CsvTable, Panel, PanelContext, Presentation};
 use crate::gimbal::ParameterNames;
 use crate::observability::{CalibrationDirection, RankReport};
 use crate::session::{LostSince, RunRecord, StepRecord};
@@ -209,15 +209,20 @@ impl RankPanel {
         self.advice.update(ui, ctx, run, step, self.in_background);
         let height = bottom - ui.cursor().top();
         ui.spacing_mut().item_spacing.y = if height < MIN_HEIGHT_WITH_CAUSE { 1.0 } else { 3.0 };
-        flight::ui(ui, ctx, run, height);
-        let verdict = verdict::verdict(step, &ctx.names());
-        let since = self.advice.since(step);
-        verdict_ui(ui, ctx, &verdict, since, height >= MIN_HEIGHT_WITH_CAUSE);
+        let with_sentences = ctx.presentation != Presentation::FigureOfReport;
+        if with_sentences {
+            flight::ui(ui, ctx, run, height);
+            let verdict = verdict::verdict(step, &ctx.names());
+            let since = self.advice.since(step);
+            verdict_ui(ui, ctx, &verdict, since, height >= MIN_HEIGHT_WITH_CAUSE);
+        }
         let Some(rank) = step.rank.as_ref().filter(|rank| !rank.parameters.is_empty()) else {
             self.over_time_ui(ui, ctx);
             return false;
         };
-        self.advice.ui(ui, ctx, step);
+        if with_sentences {
+            self.advice.ui(ui, ctx, step);
+        }
         let left = bottom - ui.cursor().top();
         let report = ctx.flight(ui, run);
         let worst = heat_map::important_rows(rank, &report.rows);

@@ -208,7 +208,7 @@ impl StepRecord {
 /// Reason for which a parameter is not determined: its cause and the parameters that it is confused with.
 fn reason(cause: LossCause, windows: Windows, partners: &[String], correlated: &str) -> String {
     if cause == LossCause::Parameterization {
-        return format!("redundant in the parameterization with {}", partners.join(", "));
+        return format!("the same motion as {}", partners.join(" and "));
     }
     let percent = 100.0 * windows.uninformed as f64 / windows.all.max(1) as f64;
     let with = (!correlated.is_empty()).then(|| format!("correlated with {correlated}"));

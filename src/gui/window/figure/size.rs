@@ -1,9 +1,9 @@
 //! Heights of figures that show a panel completely.
 
 use super::text::FigureContent;
-use crate::gui::PanelName;
 use crate::gui::comparison::ComparisonView;
 use crate::gui::theme::PANEL_MARGIN;
+use crate::gui::{PanelName, Presentation};
 use crate::session::Recording;
 
 /// Width and height of a plot in the convergence figure, in points.
@@ -12,12 +12,14 @@ const PLOT: [f32; 2] = [180.0, 77.0];
 const CONVERGENCE: f32 = 56.0;
 /// Heights of the rank figure without its rows, and of a row.
 const RANK: [f32; 2] = [350.0, 20.0];
+/// Height of the sentences above its heat map.
+const RANK_SENTENCES: f32 = 215.0;
 /// Heights of the timeline without the lanes of the runs, and of such a lane.
 const TIMELINE: [f32; 2] = [250.0, 24.0];
 /// Height of the errors over time.
 const ERRORS: f32 = 325.0;
 /// Height of the residuals.
-const RESIDUALS: f32 = 360.0;
+const RESIDUALS: f32 = 340.0;
 /// Title, legend and caption lines around an image.
 const AROUND_IMAGE: f32 = 92.0;
 /// Heights of the calibration table without its rows, and of a row.
@@ -29,7 +31,7 @@ const LETTER: [f32; 2] = [6.2, 16.0];
 const MIN_HEIGHT: f32 = 240.0;
 
 /// Height in points of a figure that is `width` points wide.
-pub fn figure_height(content: &FigureContent<'_>, width: f32) -> f32 {
+pub fn figure_height(content: &FigureContent<'_>, presentation: Presentation, width: f32) -> f32 {
     let FigureContent { recording, run, .. } = *content;
     let record = recording.runs.get(run);
     let parameters =
@@ -39,7 +41,10 @@ pub fn figure_height(content: &FigureContent<'_>, width: f32) -> f32 {
             let columns = ((width / PLOT[0]).round() as usize).max(1);
             CONVERGENCE + PLOT[1] * (parameters.div_ceil(columns) as f32).max(2.0)
         }
-        PanelName::Rank => RANK[0] + RANK[1] * parameters as f32,
+        PanelName::Rank => {
+            let sentences = if presentation == Presentation::FigureOfReport { RANK_SENTENCES } else { 0.0 };
+            RANK[0] - sentences + RANK[1] * parameters as f32
+        }
         PanelName::Calibration => CALIBRATION[0] + CALIBRATION[1] * parameters as f32,
         PanelName::Timeline => TIMELINE[0] + TIMELINE[1] * recording.runs.len() as f32,
         PanelName::Residuals => RESIDUALS,

@@ -7,9 +7,9 @@ use egui::{Vec2, vec2};
 use super::size::{caption_height, figure_height};
 use super::text::{FigureContent, FigureText};
 use crate::geometry::seconds_from_ns;
-use crate::gui::PanelName;
 use crate::gui::comparison::ComparisonView;
 use crate::gui::theme::{SMALLEST_TEXT, ThemeName};
+use crate::gui::{PanelName, Presentation};
 use crate::session::Recording;
 use crate::text::{Named, command_line};
 
@@ -106,7 +106,7 @@ impl FigureSpec {
             || {
                 let caption = self.shown_caption(recording);
                 let below = caption.map_or(0.0, |caption| caption_height(&caption, width));
-                figure_height(&self.content(recording), width) + below
+                figure_height(&self.content(recording), Presentation::Figure, width) + below
             },
             |height_mm| (height_mm / self.mm_per_point()) as f32,
         );
