@@ -56,3 +56,35 @@ impl Drop for BackgroundCheck {
         self.cancelled.store(true, Ordering::Relaxed);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::PathBuf;
+    use std::time::Instant;
+
+    use super::*;
+    use crate::session::{Session, SessionPlan, SessionRequest};
+
+    #[test]
+    fn a_log_without_a_usable_image_is_checked() {
+        let request = SessionRequest {
+            log_path: PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("sample_logs/garden.mcap"),
+            duration_s: Some(0.5),
+            ..SessionRequest::default()
+        };
+        let mut plan = SessionPlan::open(&request).unwrap();
+        for camera in &mut Arc::make_mut(&mut plan.rig).cameras {
+            camera.model.resolution_px = [320, 240];
+        }
+        let mut session = Session::start(plan).unwrap();
+        session.check_in_background(|log, rig| crate::log_check::check(log, Ok(rig), &[])).unwrap();
+        let begin = Instant::now();
+        while session.recording().is_being_checked {
+            assert!(begin.elapsed() < Duration::from_secs(20), "the check has not begun");
+            std::thread::sleep(WAIT);
+        }
+        let recording = session.recording();
+        assert!(recording.runs.iter().all(|run| run.steps.is_empty()), "no image has the size of the rig");
+        assert!(recording.check.is_some());
+    }
+}

@@ -11,7 +11,7 @@ use parking_lot::Mutex;
 use crate::log_check::Finding;
 use crate::session::engine::{Computation, EngineMessage, RecomputeRequest, Recomputed};
 use crate::session::plan::SessionError;
-use crate::session::record::{Diagnosis, Recording};
+use crate::session::record::{Diagnosis, Recording, RunRecord};
 
 struct SharedState {
     computation: Mutex<Computation>,
@@ -79,7 +79,12 @@ impl SharedComputation {
     ) -> (impl Fn() -> bool + Send + 'static, impl FnOnce(Vec<Finding>) + Send + 'static) {
         let (state, known) = (Arc::clone(&self.state), Arc::clone(&self.state));
         self.change(Computation::begin_check);
-        let has_begun = move || known.computation.lock().recording().runs.iter().any(|run| !run.steps.is_empty());
+        let has_begun = move || {
+            let computation = known.computation.lock();
+            let runs = &computation.recording().runs;
+            // A run without a usable image ends without any step.
+            runs.iter().any(|run| !run.steps.is_empty()) || runs.iter().all(RunRecord::has_ended)
+        };
         let store = move |findings| {
             state.change(|computation| computation.set_check(findings));
             if let Some(wake) = state.wake.lock().as_ref() {
