@@ -2,15 +2,16 @@
 
 use std::time::Duration;
 
-use egui::{Align, Button, Label, Layout as UiLayout, RichText, Ui};
+use egui::{Align, Button, Label, Layout as UiLayout, RichText, Sense, Ui};
 
 use super::actions::Action;
+use crate::gimbal::ParameterId;
 use crate::gui::theme::{MAX_RUNS, Theme};
 use crate::gui::{Dialog, PanelContext, PanelName, findings};
 use crate::log_check::Trust;
 use crate::observability::laboratory::SufficientMotion;
 use crate::session::{
-    Answer, Command, DiagnosisProgress, FindingSource, Recording, RunRecord, motion_text, short_motion_text,
+    Answer, Command, DiagnosisProgress, FindingSource, Recording, RunFinding, RunRecord, motion_text, short_motion_text,
 };
 
 /// Height of the bar in points.
@@ -50,8 +51,13 @@ pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, actions: &mut Vec<Acti
                 None => (answer.sentence.as_str(), color(&answer, &theme)),
             };
             let sentence = RichText::new(format!("{of_run}{text}")).size(SENTENCE_SIZE);
-            let label = ui.add(Label::new(sentence.color(color).strong()).truncate());
-            label.on_hover_text(hover_text(&answer));
+            let shown = if pending.is_none() { Subject::of(&answer) } else { None };
+            let sense = if shown.is_some() { Sense::click() } else { Sense::hover() };
+            let label = ui.add(Label::new(sentence.color(color).strong()).truncate().sense(sense));
+            let label = label.on_hover_text(hover_text(&answer));
+            if let Some(shown) = shown.filter(|_| label.clicked()) {
+                shown.show(ctx);
+            }
             let rig = &ctx.recording.rig;
             let (remedy, whole) = match &motion {
                 Some(motion) => (short_motion_text(motion, rig), motion_text(motion, rig)),
@@ -62,6 +68,30 @@ pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, actions: &mut Vec<Acti
             }
         });
     });
+}
+
+/// Subject of a sentence, which a click on it shows.
+enum Subject<'a> {
+    Finding(&'a RunFinding),
+    /// The parameter that is farthest from the required accuracy.
+    Parameter(ParameterId),
+}
+
+impl<'a> Subject<'a> {
+    fn of(answer: &'a Answer) -> Option<Self> {
+        let worst = || answer.requirement.as_ref()?.worst_parameter.map(Self::Parameter);
+        answer.findings.first().map(Self::Finding).or_else(worst)
+    }
+
+    fn show(&self, ctx: &mut PanelContext<'_>) {
+        match self {
+            Self::Finding(finding) => findings::show(ctx, finding),
+            Self::Parameter(parameter) => {
+                ctx.selection.parameter = Some(*parameter);
+                ctx.selection.wanted_panel = Some(PanelName::Calibration);
+            }
+        }
+    }
 }
 
 /// Sentence in place of an answer that is still going to change: the check may name a cause of what the run shows, and the
@@ -153,7 +183,7 @@ mod tests {
     use crate::gui::PanelName;
     use crate::gui::window::tests::{Bench, SECOND_NS, bench, bench_of, commands_of, sample};
     use crate::log_check::{Finding, FindingInterval};
-    use crate::session::Command;
+    use crate::session::{Answer, Command};
 
     #[test]
     fn an_answer_that_is_going_to_change_is_not_said() {
@@ -191,6 +221,19 @@ mod tests {
         let pushed = commands_of(&mut harness, |harness| harness.get_by_label(label).click());
         assert_eq!(pushed, [Command::Seek { stamp_ns: 2 * SECOND_NS }]);
         assert!(is_shown(&harness));
+    }
+
+    #[test]
+    fn a_click_on_the_sentence_selects_the_parameter_that_is_farthest_from_the_requirement() {
+        let mut recording = sample();
+        recording.runs.truncate(1);
+        let requirement = Answer::of_run(&recording, &recording.runs[0]).requirement.expect("a calibration");
+        assert!(requirement.worst.is_some());
+        let mut harness = bench_of(recording, [1600.0, 900.0]);
+        harness.query_all_by_label_contains(", worst ").next().expect("the sentence names it").click();
+        harness.run_steps(3);
+        assert_eq!(harness.state().selection.parameter, requirement.worst_parameter);
+        assert!(harness.state().window.tiles.layout.is_visible(PanelName::Calibration));
     }
 
     #[test]

@@ -74,9 +74,13 @@ impl RunFinding {
     /// where they are worse than it says. Images and motion are rather conditions of a flight, and no residual depends on
     /// the ground truth.
     fn is_cause(&self) -> bool {
-        let of_measurements =
-            |finding: &Finding| !matches!(finding.area, Area::Images | Area::Motion) && !is_about_ground_truth(finding);
-        self.checked.as_ref().is_some_and(of_measurements)
+        let of_measurements = |finding: &Finding| !matches!(finding.area, Area::Images | Area::Motion);
+        self.checked.as_ref().is_some_and(of_measurements) && !self.is_about_ground_truth()
+    }
+
+    /// True if it concerns errors against the ground truth, which the estimate does not depend on.
+    pub(super) fn is_about_ground_truth(&self) -> bool {
+        self.source == FindingSource::GroundTruth || self.checked.as_ref().is_some_and(is_about_ground_truth)
     }
 
     /// Time from which on all later results are affected, in seconds since the log began; `None` for the whole run, and for a
@@ -126,6 +130,8 @@ pub struct Requirement {
     pub required: String,
     /// Parameter with the largest ratio of σ to the required accuracy, with its σ; `None` if all meet it.
     pub worst: Option<String>,
+    #[serde(skip)]
+    pub worst_parameter: Option<ParameterId>,
     /// Time from which on all parameters meet it, in seconds since the log began.
     pub since_s: Option<f64>,
 }
@@ -251,8 +257,11 @@ fn check_findings<'a>(rig: &'a Rig, check: &'a [Finding], run: &'a RunRecord) ->
     })
 }
 
+/// True if the ground truth is the subject of the title of a finding; others name it as what they are measured by.
 fn is_about_ground_truth(finding: &Finding) -> bool {
-    finding.title.contains("ground truth")
+    const SUBJECTS: [&str; 3] =
+        ["the ground truth ", "the world of the ground truth ", "unexplained: the rotations of the ground truth "];
+    SUBJECTS.iter().any(|subject| finding.title.starts_with(subject))
 }
 
 /// True unless a finding is about a camera or about joint angles that the run does not use. The title of a finding names
@@ -451,6 +460,7 @@ fn requirement(rig: &Rig, run: &RunRecord) -> Option<Requirement> {
         worst: worst.map(|(column, parameter)| {
             format!("{} ± {}", names.name(*parameter), parameter.shown().sigma(calibration.sigmas[*column]))
         }),
+        worst_parameter: worst.map(|(_, parameter)| *parameter),
         since_s: since.filter(|_| met == counted.len()).map(|step| seconds_from_ns(step.report.stamp_ns)),
     })
 }
@@ -458,7 +468,7 @@ fn requirement(rig: &Rig, run: &RunRecord) -> Option<Requirement> {
 impl Requirement {
     /// For example `⚠ 6 of 18 parameters within 5 mm and 0.1°, worst pitch.a ± 7.4 mm`.
     fn sentence(&self) -> String {
-        let Self { met, parameters, required, worst, since_s } = self;
+        let Self { met, parameters, required, worst, since_s, .. } = self;
         let mark = if met == parameters { Trust::Trusted.mark() } else { Trust::Doubtful.mark() };
         let worst = worst.as_ref().map_or_else(String::new, |worst| format!(", worst {worst}"));
         let since = since_s.map_or_else(String::new, |since_s| format!(", since {since_s:.1} s"));

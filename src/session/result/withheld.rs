@@ -1,7 +1,6 @@
 //! Verdicts on the calibration, withheld while a run is not trusted.
 
 use super::answer::Answer;
-use crate::log_check::Trust;
 use crate::observability::Determination;
 use crate::session::record::{FlightParameter, Recording, RunRecord, flight_rows};
 use crate::text::Named as _;
@@ -16,13 +15,16 @@ pub struct Withheld {
 }
 
 impl Answer {
-    /// Reason for which the verdicts of the run are withheld; `None` for a trusted run.
+    /// Reason for which the verdicts of the run are withheld; `None` for a trusted run, and for one about which only the
+    /// ground truth raises a doubt.
     pub fn withheld(&self) -> Option<Withheld> {
-        let first = self.findings.first().filter(|_| self.trust > Trust::Trusted)?;
+        let of_estimate = || self.findings.iter().filter(|finding| !finding.is_about_ground_truth());
+        let first = of_estimate().next()?;
+        let trust = of_estimate().map(|finding| finding.trust).max()?;
         Some(Withheld {
-            from_ns: self.findings.iter().map(|finding| finding.since_ns.unwrap_or(i64::MIN)).min()?,
-            reason: format!("the run is {}: {}", self.trust.name(), first.statement),
-            remedy: self.remedy.clone(),
+            from_ns: of_estimate().map(|finding| finding.since_ns.unwrap_or(i64::MIN)).min()?,
+            reason: format!("the run is {}: {}", trust.name(), first.statement),
+            remedy: first.remedy.clone(),
         })
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::faults::{Area, Severity};
 use crate::gimbal::ParameterId;
-use crate::log_check::{Finding, FindingInterval};
+use crate::log_check::{Finding, FindingInterval, Trust};
 use crate::observability::Determination;
 use crate::session::record::{FlightParameter, FlightVerdicts, RunRecord};
 use crate::session::result::Answer;
@@ -106,6 +106,10 @@ fn verdicts_of_a_run_that_is_not_trusted_are_withheld() {
     assert!(rows.iter().all(|row| row.remedy == "mount it softly" && row.cause.is_none()), "{rows:?}");
     assert!(!doubtful.meets_requirement());
     assert_eq!(withheld.verdict(0, Determination::Initializing), Determination::Initializing);
+    let late = Answer::of(&flight.given_rig, &[warning(Area::Time, "the ground truth is 100 ms late")], &run);
+    assert_eq!((late.trust, late.withheld()), (Trust::Doubtful, None), "no verdict depends on the ground truth");
+    let gyroscope = warning(Area::Imu, "the gyroscope measures 2.00 times the rotation of the ground truth");
+    assert!(Answer::of(&flight.given_rig, &[gyroscope], &run).withheld().is_some());
 }
 
 #[test]
