@@ -89,20 +89,7 @@ pub fn calibrate_along(
         options,
         pose_covariances: options.pose_covariances && name == BOTH,
     };
-    let joints = input.gimbal_camera.chain.joint_count();
-    let first = BundleEstimate {
-        joints_rad: frame_sets
-            .iter()
-            .map(|frame_set| {
-                frame_set.gimbal.as_ref().map_or_else(|| vec![0.0; joints], |gimbal| gimbal.encoder.angles_rad.clone())
-            })
-            .collect(),
-        navigation,
-        extrinsics: priors.border.extrinsics,
-        shifts_s: priors.border.shifts_s,
-        chain: priors.border.chain.given.clone(),
-        landmarks: Vec::new(),
-    };
+    let first = given_estimate(input, &priors, &frame_sets, navigation);
     let static_tracks = observations::collect(input, options, &frame_sets, Camera::Static, &|_| true);
     let alone = stage(ALONE).run(&mut frame_sets, &static_tracks, first, &mut |round| {
         report_progress("calibrating the static camera", 0.5 + 0.05 * round as f64)
@@ -178,6 +165,27 @@ pub fn calibrate_along(
         posterior: posterior(&both, &priors.border),
         visited_rad,
     })
+}
+
+/// Values of the encoders, the rig and the trajectory, without landmarks; joint angles are zero where no encoder was read.
+fn given_estimate(
+    input: &CalibrationInput,
+    priors: &Priors,
+    frame_sets: &[FrameSet],
+    navigation: Vec<NavigationState>,
+) -> BundleEstimate {
+    let joints = input.gimbal_camera.chain.joint_count();
+    let angles_rad = |frame_set: &FrameSet| {
+        frame_set.gimbal.as_ref().map_or_else(|| vec![0.0; joints], |gimbal| gimbal.encoder.angles_rad.clone())
+    };
+    BundleEstimate {
+        joints_rad: frame_sets.iter().map(angles_rad).collect(),
+        navigation,
+        extrinsics: priors.border.extrinsics,
+        shifts_s: priors.border.shifts_s,
+        chain: priors.border.chain.given.clone(),
+        landmarks: Vec::new(),
+    }
 }
 
 /// Reports progress; an error if `on_progress` breaks.

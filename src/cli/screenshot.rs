@@ -6,7 +6,7 @@ use std::sync::Arc;
 use anyhow::{Context as _, Result, bail};
 use clap::{Args, ValueEnum};
 use dcvins::export::{
-    PANEL_NAMES, Renderer, STUDY_PANEL_NAMES, ScreenshotOptions, check_log, check_screenshot, draw_panel,
+    CachedFile, PANEL_NAMES, Renderer, STUDY_PANEL_NAMES, ScreenshotOptions, check_log, check_screenshot, draw_panel,
     draw_panel_svg, figure_bytes, is_session, open_session, panel_csv, png_bytes, read_motion, write_screenshot,
 };
 use dcvins::flight_log::ImageReader;
@@ -199,17 +199,8 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<ExitOutcome>
     };
     let mut cached = shown.cached(arguments, format);
     if let Some(files) = cached.as_ref().and_then(CachedResult::load) {
-        let mut files = files.iter();
-        for cursor_ns in stamps_ns {
-            let path = path_at(*cursor_ns);
-            let table = arguments.csv.then(|| path.with_extension("csv"));
-            for (path, (_, content)) in [Some(&path), table.as_ref()].into_iter().flatten().zip(&mut files) {
-                write_screenshot(content, path)?;
-            }
-            if several {
-                print(&format!("{}\n", path.display()))?;
-            }
-        }
+        let paths: Vec<PathBuf> = stamps_ns.iter().map(|cursor_ns| path_at(*cursor_ns)).collect();
+        write_known(&files, &paths, arguments.csv)?;
         return Ok(ExitOutcome::Success);
     }
     let mut computation =
@@ -273,6 +264,21 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<ExitOutcome>
         cached.store();
     }
     Ok(ExitOutcome::Success)
+}
+
+/// Writes screenshots from the cache, with their tables if they have some; several paths are printed.
+fn write_known(files: &[CachedFile], paths: &[PathBuf], with_tables: bool) -> Result<()> {
+    let mut files = files.iter();
+    for path in paths {
+        let table = with_tables.then(|| path.with_extension("csv"));
+        for (path, (_, content)) in [Some(path), table.as_ref()].into_iter().flatten().zip(&mut files) {
+            write_screenshot(content, path)?;
+        }
+        if paths.len() > 1 {
+            print(&format!("{}\n", path.display()))?;
+        }
+    }
+    Ok(())
 }
 
 /// Times of the screenshots of one command, in nanoseconds since the log began.

@@ -161,19 +161,7 @@ pub fn window_ui(ui: &mut Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>
     }
     actions.extend(state.panels.comparison.asked.take().map(Action::Dialog));
     state.requests.extend(state.panels.laboratory.take_request().map(WindowRequest::Motion));
-
-    let MainWindow { panels, tiles, settings, history, requests, dialogs, .. } = &mut *state;
-    let parts = DialogParts { panels, tiles, settings, history, requests, actions: &mut actions };
-    dialogs::ui(ui, dialogs, ctx, parts);
-    shortcuts::ui(ui, &theme, &mut state.dialogs.shortcuts_open);
-    state.notices.list_ui(ui, ctx);
-    tour::ui(ui, &mut state.tour, &mut state.tiles, &state.panels.rank, ctx);
-    state.help.ui(ui, &theme, &state.tiles.places);
-    state.notices.toasts_ui(ui, &theme);
-    state.ring.ui(ui, &theme);
-    let MainWindow { tiles, notices, dialogs, help, menu, .. } = &mut *state;
-    let parts = MenuParts { tiles, notices, dialogs, help, actions: &mut actions };
-    context_menu::ui(ui, menu, ctx, clicks.menu, parts);
+    above_panels_ui(ui, state, ctx, &clicks, &mut actions);
     for action in actions {
         perform(ui, action, state, ctx);
     }
@@ -181,6 +169,27 @@ pub fn window_ui(ui: &mut Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>
     if state.history.follow(&state.settings, &state.tiles.layout, &ctx.playback.markers, settled) {
         ui.request_repaint();
     }
+}
+
+/// Draws what lies above the panels: dialogs, messages, tour, help and menus.
+fn above_panels_ui(
+    ui: &mut Ui,
+    state: &mut MainWindow,
+    ctx: &mut PanelContext<'_>,
+    clicks: &TabClicks,
+    actions: &mut Vec<Action>,
+) {
+    let theme = *ctx.theme;
+    let MainWindow { panels, tiles, settings, history, requests, dialogs, .. } = &mut *state;
+    dialogs::ui(ui, dialogs, ctx, DialogParts { panels, tiles, settings, history, requests, actions });
+    shortcuts::ui(ui, &theme, &mut state.dialogs.shortcuts_open);
+    state.notices.list_ui(ui, ctx);
+    tour::ui(ui, &mut state.tour, &mut state.tiles, &state.panels.rank, ctx);
+    state.help.ui(ui, &theme, &state.tiles.places);
+    state.notices.toasts_ui(ui, &theme);
+    state.ring.ui(ui, &theme);
+    let MainWindow { tiles, notices, dialogs, help, menu, .. } = &mut *state;
+    context_menu::ui(ui, menu, ctx, clicks.menu, MenuParts { tiles, notices, dialogs, help, actions });
 }
 
 /// Finds the plot under the pointer before the panels are drawn, and sets what all plots show.
