@@ -16,10 +16,17 @@ use crate::session::{RunRecord, Session, SessionPlan, SessionRequest};
 
 /// A window with the first seconds of the sample log, processed by one run.
 pub(super) fn window_over_garden(spec: &str, duration_s: f64) -> Harness<'static, App> {
+    window_of(garden(spec, duration_s))
+}
+
+fn garden(spec: &str, duration_s: f64) -> Session {
     let log_path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("sample_logs/garden.mcap");
     let specs = vec![spec.parse().unwrap()];
     let request = SessionRequest { log_path, specs, duration_s: Some(duration_s), ..SessionRequest::default() };
-    let session = Session::start(SessionPlan::open(&request).unwrap()).unwrap();
+    Session::start(SessionPlan::open(&request).unwrap()).unwrap()
+}
+
+fn window_of(session: Session) -> Harness<'static, App> {
     let open: OpenLog = Arc::new(|_, _| Err(OpenFailure::Problem("no other log is opened here".to_owned())));
     let mut app = App::new(open, Arc::new(TestDesktop::default()) as Arc<dyn Desktop>, ThemeName::Dark);
     app.show(Box::new(session), None);
@@ -147,4 +154,31 @@ fn a_classical_run_goes_on_as_minimal_from_where_its_rank_drops() {
     let buttons = harness.query_all_by_role(Role::Button);
     let unnamed = buttons.filter(|node| node.accesskit_node().label().is_none_or(|name| name.is_empty())).count();
     assert_eq!(unnamed, 0, "every button has a name");
+}
+
+/// The noise of the features is given five times too small, which neither the check nor an earlier diagnosis explains.
+#[test]
+fn a_run_that_nothing_explains_is_diagnosed_when_it_has_ended_and_its_log_is_checked() {
+    let is_diagnosed = |harness: &Harness<'static, App>| runs(harness)[0].diagnosis.is_some();
+    let ended = |checked: bool| {
+        let session = garden("auto:pixel-noise=0.2", 6.0);
+        if checked {
+            session.check_log(|log, rig| crate::log_check::check(log, Ok(rig), &[]));
+        }
+        let mut harness = window_of(session);
+        run_until(&mut harness, all_finished);
+        harness.run_steps(4);
+        harness
+    };
+    let unchecked = ended(false);
+    assert!(unchecked.query_by_label("Stop").is_none() && !is_diagnosed(&unchecked), "the check may explain it");
+    let mut harness = ended(true);
+    assert!(harness.query_by_label("Stop").is_some() || is_diagnosed(&harness), "it has begun by itself");
+    if let Some(stop) = harness.query_by_label("Stop") {
+        stop.click();
+    }
+    run_until(&mut harness, is_diagnosed);
+    harness.run_steps(40);
+    assert!(harness.query_by_label("Stop").is_none(), "it does not begin again");
+    assert!(harness.query_by_label_contains("the residuals disagree with their noise").is_some(), "the window goes on");
 }
