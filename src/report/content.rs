@@ -86,7 +86,7 @@ impl ReportContent {
             let (events, frequent_events) = events(run);
             RunContent {
                 label: run.spec.label.clone(),
-                observability: observability(recording, run),
+                observability: observability(recording, run, &summary.answer),
                 position_sigma_m: last_position_sigma_m(run),
                 nees: PoseError::mean_nees(&run.pose_errors()),
                 reprojection_px: reprojection_px(run),

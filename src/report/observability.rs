@@ -6,7 +6,7 @@ use crate::geometry::seconds_from_ns;
 use crate::log_check::Severity;
 use crate::observability::laboratory::{Situation, advise};
 use crate::observability::{RankReport, parameters_of};
-use crate::session::{LostSince, Recording, RunRecord, StepRecord};
+use crate::session::{Answer, LostSince, Recording, RunRecord, StepRecord};
 use crate::table::Medium::Page;
 
 /// Number of parameters by which a direction is named.
@@ -22,8 +22,9 @@ pub(super) struct Observability {
     pub(super) details: Vec<String>,
 }
 
-/// Ranks at the end of the run: the least observable direction, since when, the cause, and suggested excitation.
-pub(super) fn observability(recording: &Recording, run: &RunRecord) -> Option<Observability> {
+/// Ranks at the end of the run: the least observable direction, since when, the cause, and suggested excitation if the run
+/// is trusted.
+pub(super) fn observability(recording: &Recording, run: &RunRecord, answer: &Answer) -> Option<Observability> {
     let place = run.steps.iter().rposition(|step| step.rank.is_some())?;
     let (earlier, step) = (&run.steps[..place], run.steps.get(place)?);
     let rank = step.rank.as_ref().filter(|rank| !rank.parameters.is_empty())?;
@@ -49,10 +50,12 @@ pub(super) fn observability(recording: &Recording, run: &RunRecord) -> Option<Ob
         let at_s = Page.fixed(seconds_from_ns(stamp_ns), 2);
         details.push(format!("Largest informed rank of the run: {most} at {at_s} s."));
     }
-    if let Some((parameter, motion)) = rank.sensor_excitation() {
+    let is_trusted = answer.withheld().is_none();
+    if let Some((parameter, motion)) = rank.sensor_excitation().filter(|_| is_trusted) {
         details.push(format!("Suggested excitation for {}: {motion}.", names.name(parameter)));
     }
-    if rank.rank_informed < columns
+    if is_trusted
+        && rank.rank_informed < columns
         && let Some(advice) =
             Situation::of_step(&step.report, rank, &recording.rig, &run.camera_key).as_ref().and_then(advise)
         && let Some(sentence) = advice.sentence()

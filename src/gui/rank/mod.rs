@@ -220,7 +220,9 @@ impl RankPanel {
             self.over_time_ui(ui, ctx);
             return false;
         };
-        if with_sentences {
+        // No motion helps a run that is not trusted.
+        let withheld = ctx.answer(run).withheld();
+        if with_sentences && withheld.is_none_or(|it| step.report.stamp_ns < it.from_ns) {
             self.advice.ui(ui, ctx, step);
         }
         let left = bottom - ui.cursor().top();
