@@ -60,6 +60,15 @@ impl RequiredAccuracy {
         }
     }
 
+    /// Accuracy that σ have to reach before they are multiplied by a factor: lengths, angles and single parameters divided
+    /// by it.
+    #[must_use]
+    pub fn divided(mut self, factor: f64) -> Self {
+        let own = self.parameters.values_mut().chain([&mut self.translation_m, &mut self.rotation_rad]);
+        own.for_each(|sigma| *sigma /= factor);
+        self
+    }
+
     /// Dimension that a key sets, `translation`, `rotation` or the name of a parameter of the rig.
     ///
     /// # Errors

@@ -17,10 +17,17 @@ impl Answer {
 /// Motion after a step of a run with a rig's camera, within slow limits of joints and vehicle, after which the parameters of
 /// the chain reach the required accuracy; `None` if they do, or if the step has no rank report.
 ///
-/// Time offsets and intrinsics of sensors are not planned.
+/// The factor on the σ of the step holds for its information and for what the motion adds. Time offsets and intrinsics of
+/// sensors are not planned.
 pub fn motion_after(step: &StepRecord, rig: &Rig, camera_key: &str) -> Option<SufficientMotion> {
-    let situation = Situation::of_step(&step.report, step.rank.as_ref()?, rig, camera_key)?;
-    sufficient_motion(&situation, &EnteredLimits::SLOW.around(&situation))
+    let mut situation = Situation::of_step(&step.report, step.rank.as_ref()?, rig, camera_key)?;
+    let factor = step.report.calibration.sigma_scale;
+    situation.required = situation.required.divided(factor);
+    let mut motion = sufficient_motion(&situation, &EnteredLimits::SLOW.around(&situation))?;
+    if let Some((_, sigma)) = &mut motion.remaining {
+        *sigma *= factor;
+    }
+    Some(motion)
 }
 
 /// Number of moves that an instruction names.
@@ -54,5 +61,36 @@ fn with_remaining(text: String, motion: &SufficientMotion, rig: &Rig) -> String 
             format!("{text}; {name} then still has ± {}", parameter.shown().sigma(sigma))
         }
         None => text,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Dimension;
+    use crate::session::tests::memory::recorded;
+    use crate::simulation::{SyntheticOptions, synthetic_tracks};
+
+    #[test]
+    fn a_run_whose_sigmas_are_multiplied_needs_a_longer_motion() {
+        let flight = synthetic_tracks(&SyntheticOptions::default());
+        let mut rig = flight.given_rig.clone();
+        let run = recorded(&flight, "auto");
+        let mut step = (**run.steps.last().unwrap()).clone();
+        // The motion of a run that nearly reaches the requirement is short.
+        let largest = |of: Dimension| {
+            let calibration = &step.report.calibration;
+            let sigmas = calibration.parameters.iter().zip(&calibration.sigmas);
+            sigmas.filter(|(it, _)| it.dimension() == of).map(|(_, sigma)| *sigma).fold(0.0, f64::max)
+        };
+        let required = &mut rig.required_accuracy;
+        (required.translation_m, required.rotation_rad) =
+            (0.95 * largest(Dimension::Length), 0.95 * largest(Dimension::Angle));
+        let motion = |step: &StepRecord| motion_after(step, &rig, &run.camera_key).expect("accuracy lacks");
+        let short = motion(&step);
+        assert!(short.remaining.is_none(), "{:?}", short.moves);
+        step.report.calibration.sigma_scale = 3.0;
+        let long = motion(&step);
+        assert!(long.duration_s() > short.duration_s(), "{} and {} s", long.duration_s(), short.duration_s());
     }
 }
