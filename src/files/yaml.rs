@@ -1,4 +1,6 @@
-//! Numbers and names as YAML scalars.
+//! Numbers and names as YAML scalars, and the head of YAML files of `OpenCV`.
+
+use std::borrow::Cow;
 
 /// Shortest decimal that reads back as the same number, in the notation of YAML 1.1 (`PyYAML`), which requires a
 /// point before an exponent, and a sign in it.
@@ -8,6 +10,12 @@ pub(crate) fn number(value: f64) -> String {
     let point = if mantissa.contains('.') { "" } else { ".0" };
     let sign = if exponent.starts_with('-') { "" } else { "+" };
     format!("{mantissa}{point}e{sign}{exponent}")
+}
+
+/// The text of a YAML file with the first line of `OpenCV`'s files, `%YAML:1.0`, which is no directive of YAML, as a comment,
+/// so that lines keep their numbers.
+pub(crate) fn without_opencv_head(text: &str) -> Cow<'_, str> {
+    text.strip_prefix("%YAML:").map_or(Cow::Borrowed(text), |rest| Cow::Owned(format!("#{rest}")))
 }
 
 /// Numbers as a YAML list in brackets.

@@ -10,6 +10,7 @@ use super::fields::Field;
 use super::keys;
 use crate::files::FileError;
 use crate::files::located::Located;
+use crate::files::yaml::without_opencv_head;
 use crate::text::{shortened, without_bom};
 
 /// Largest rig file in bytes; the rig of 16 links and 16 cameras takes 16 kB.
@@ -47,6 +48,7 @@ impl Document {
     }
 
     pub(crate) fn parse(text: &str, file: &Path) -> Result<Self, FileError> {
+        let text = &without_opencv_head(text);
         check_indentation(text, file)?;
         match Located::of_yaml(text) {
             Ok(value) => Ok(Self { value, file: file.to_owned() }),

@@ -1,4 +1,5 @@
-//! Kalibr's files as a rig: `camchain-imucam.yaml` with `imu.yaml` in the same folder.
+//! Files of Kalibr and OpenVINS as a rig: `camchain-imucam.yaml` with `imu.yaml` in the same folder, or
+//! `kalibr_imucam_chain.yaml` with `kalibr_imu_chain.yaml`.
 
 use std::path::{Path, PathBuf};
 
@@ -10,8 +11,11 @@ use crate::files::located::Located;
 use crate::geometry::RigidTransform;
 use crate::sensors::{CameraMount, RequiredAccuracy, Rig};
 
-/// Usual names of Kalibr's IMU file.
-const IMU_FILES: [&str; 3] = ["imu.yaml", "imu0.yaml", "imu-calib.yaml"];
+/// Usual names of the IMU file.
+const IMU_FILES: [&str; 4] = ["imu.yaml", "imu0.yaml", "imu-calib.yaml", "kalibr_imu_chain.yaml"];
+/// Beginnings of the names of camera chains, and of the IMU files that belong to them.
+const NAMES: [(&str, &str); 3] =
+    [("camchain-imucam", "imu"), ("camchain", "imu"), ("kalibr_imucam_chain", "kalibr_imu_chain")];
 
 pub(crate) fn is_camera_chain(document: &Located) -> bool {
     document.get("rig_version").is_none()
@@ -20,12 +24,17 @@ pub(crate) fn is_camera_chain(document: &Located) -> bool {
             .is_some_and(|camera| camera.get("mount").is_none() && camera.get("camera_model").is_some())
 }
 
+/// True for the name of a camera chain, in lower case.
+pub(crate) fn is_chain_name(name: &str) -> bool {
+    NAMES.iter().any(|(chain, _)| name.contains(chain))
+}
+
 /// Candidate files for the IMU of a camera chain, most likely first: `imu-RUN.yaml` next to `camchain-imucam-RUN.yaml`,
-/// then the plain names.
+/// or `kalibr_imu_chain.yaml` next to `kalibr_imucam_chain.yaml`, then the plain names.
 pub(crate) fn imu_files(camera_chain: &Path) -> Vec<PathBuf> {
     let name = camera_chain.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    let of_run = ["camchain-imucam", "camchain"].into_iter().find_map(|prefix| name.strip_prefix(prefix));
-    let of_run = of_run.filter(|rest| *rest != ".yaml").map(|rest| format!("imu{rest}"));
+    let of_run = NAMES.into_iter().find_map(|(chain, imu)| Some(format!("{imu}{}", name.strip_prefix(chain)?)));
+    let of_run = of_run.filter(|name| name != IMU_FILES[0]);
     let names = of_run.into_iter().chain(IMU_FILES.into_iter().map(str::to_owned));
     names.map(|name| camera_chain.with_file_name(name)).collect()
 }
@@ -63,10 +72,14 @@ pub(crate) fn read_camera_chain(
     })
 }
 
-/// Transform `camera_from_imu`: `T_cam_imu`, else the transform of the previous camera followed by `T_cn_cnm1`, from
+/// Transform `camera_from_imu`: `T_cam_imu`, the inverse of `T_imu_cam` (OpenVINS), else the transform of the previous camera followed by `T_cn_cnm1`, from
 /// the previous camera to this one.
 fn camera_from_imu(camera: &Field<'_>, previous_from_imu: Option<RigidTransform>) -> Result<RigidTransform, FileError> {
     let (from_imu, from_previous) = (camera.field("T_cam_imu"), camera.field("T_cn_cnm1"));
+    let imu_from_camera = camera.field("T_imu_cam");
+    if imu_from_camera.is_present() && !from_imu.is_present() {
+        return Ok(imu_from_camera.transform()?.inverse());
+    }
     match previous_from_imu {
         Some(previous_from_imu) if !from_imu.is_present() && from_previous.is_present() => {
             Ok(from_previous.transform()? * previous_from_imu)

@@ -44,14 +44,17 @@ const IMU_KEYS: &[&str] = &[
     "gyroscope_random_walk",
     "gyroscopes",
     "accelerometers",
+    "Tw",
+    "R_IMUtoGYRO",
+    "Ta",
     "mount",
     "T_cam_imu",
     "timeshift_imu1_imu",
 ];
-/// Includes keys that Kalibr writes for its IMU models, and OpenVINS in the same files.
+/// Includes keys that Kalibr writes for its IMU models, and OpenVINS in its own files.
 const IMU: Keys = Keys {
     read: IMU_KEYS.split_at(IMU_KEYS.len() - 3).0,
-    unused: &["model", "T_i_b", "time_offset", "Tw", "R_IMUtoGYRO", "Ta", "R_IMUtoACC", "Tg"],
+    unused: &["model", "T_i_b", "time_offset", "R_IMUtoACC", "Tg"],
 };
 const GIMBAL_IMU: Keys = Keys { read: IMU_KEYS, unused: IMU.unused };
 const CAMERA: Keys = Keys {
@@ -199,6 +202,10 @@ fn check_imu(imu: &Located, path: &str, keys: &Keys, found: &mut Found) {
 
 fn check_camera(camera: &Located, path: &str, found: &mut Found) {
     check_mapping(camera, path, &CAMERA, found);
+    if camera.get("mount").is_none() {
+        // OpenVINS's camera chain.
+        found.unknown.retain(|(field, ..)| field.strip_suffix(".T_imu_cam") != Some(path));
+    }
     if camera.get("T_cam_imu").is_none() {
         // The pose relative to the previous camera is used.
         found.unused.retain(|key| key.strip_suffix(".T_cn_cnm1") != Some(path));

@@ -68,13 +68,15 @@ pub(super) fn read_intrinsics_sigma(camera: &Field<'_>) -> Result<Option<Intrins
 }
 
 /// Reads `gyroscopes` and `accelerometers` in Kalibr's notation; a missing matrix is the identity.
-pub(super) fn read_imu_intrinsics(imu: &Field<'_>) -> Result<ImuIntrinsics, FileError> {
+pub(super) fn read_imu_intrinsics<'a>(imu: &Field<'a>) -> Result<ImuIntrinsics, FileError> {
     let (gyroscopes, accelerometers) = (imu.field("gyroscopes"), imu.field("accelerometers"));
-    let from_imu = gyroscopes.field("C_gyro_i").optional().map(|field| field.rotation()).transpose()?;
+    // The same matrices have other names in OpenVINS's files.
+    let either = |kalibr: Field<'a>, openvins: &str| kalibr.optional().unwrap_or_else(|| imu.field(openvins));
+    let from_imu = either(gyroscopes.field("C_gyro_i"), "R_IMUtoGYRO").optional();
     let kalibr = KalibrImuMatrices {
-        gyroscope_m: read_scale(&gyroscopes.field("M"))?,
-        gyroscope_from_imu: from_imu.unwrap_or_else(Matrix3::identity),
-        accelerometer_m: read_scale(&accelerometers.field("M"))?,
+        gyroscope_m: read_scale(&either(gyroscopes.field("M"), "Tw"))?,
+        gyroscope_from_imu: from_imu.map(|field| field.rotation()).transpose()?.unwrap_or_else(Matrix3::identity),
+        accelerometer_m: read_scale(&either(accelerometers.field("M"), "Ta"))?,
     };
     ImuIntrinsics::from_kalibr(&kalibr)
         .ok_or_else(|| gyroscopes.field("M").error("the matrix cannot be inverted, expected one near the identity"))

@@ -545,6 +545,42 @@ fn poses_of_kalibrs_cameras_are_chained() {
     );
 }
 
+/// OpenVINS's chain has the inverse transform and the first line of `OpenCV`'s files; its IMU has other names of matrices.
+#[test]
+fn a_camera_chain_of_openvins_is_read_as_one_of_kalibr() {
+    let folder = tempfile::TempDir::new().unwrap();
+    let [kalibr, openvins] = ["camchain-imucam.yaml", "kalibr_imucam_chain.yaml"].map(|name| folder.path().join(name));
+    let scale = "[[1.02, 0.0, 0.0], [0.01, 0.99, 0.0], [0.0, 0.0, 1.0]]";
+    fs::write(
+        folder.path().join("imu.yaml"),
+        format!("{IMU}gyroscopes: {{M: {scale}}}\naccelerometers: {{M: {scale}}}\n"),
+    )
+    .unwrap();
+    fs::write(&kalibr, CAMERA_CHAIN).unwrap();
+    let expected = Rig::from_file(&kalibr).unwrap();
+    let CameraMount::Static { imu_from_camera } = &expected.cameras[0].mount else { panic!("static") };
+    let (begin, end) = (CAMERA_CHAIN.find("  T_cam_imu").unwrap(), CAMERA_CHAIN.find("  cam_overlaps").unwrap());
+    let matrix = imu_from_camera.to_matrix();
+    let rows = matrix.row_iter().map(|row| format!("  - {:?}\n", row.iter().collect::<Vec<_>>()));
+    let inverse = format!("  T_imu_cam: # camera to IMU\n{}", rows.collect::<String>());
+    let chain = format!("%YAML:1.0\n\n{}{inverse}{}", &CAMERA_CHAIN[..begin], &CAMERA_CHAIN[end..]);
+    fs::write(&openvins, &chain).unwrap();
+    let nested = format!("  {}", IMU.trim_end().replace('\n', "\n  "));
+    let imu = format!(
+        "%YAML:1.0\n\nimu0:\n{nested}\n  Tw: {scale}\n  Ta: {scale}\n  Tg: [[0, 0, 0], [0, 0, 0], [0, 0, 0]]\n"
+    );
+    fs::write(folder.path().join("kalibr_imu_chain.yaml"), imu).unwrap();
+    let found = Rig::from_file(&openvins).unwrap();
+    assert_eq!(found.imu, expected.imu);
+    assert!(!found.imu.intrinsics.is_identity());
+    let CameraMount::Static { imu_from_camera: read } = &found.cameras[0].mount else { panic!("static") };
+    assert!((read.to_matrix() - imu_from_camera.to_matrix()).amax() < 1e-12);
+    // Lines keep their numbers.
+    fs::write(&openvins, chain.replace("752", "wide")).unwrap();
+    let message = Rig::from_file(&openvins).unwrap_err().to_string();
+    assert!(message.contains("cam0.resolution") && message.contains("line 13"), "{message}");
+}
+
 #[test]
 fn byte_order_marks_line_ends_and_spaces_make_no_difference() {
     let folder = tempfile::TempDir::new().unwrap();

@@ -13,6 +13,7 @@ use super::source_file::read_description;
 use crate::camera::CameraModel;
 use crate::files::FileError;
 use crate::files::limits::LINE_BYTES;
+use crate::files::yaml::without_opencv_head;
 use crate::flight_log::container::file::kind_of;
 use crate::geometry::{RigidTransform, seconds_from_ns};
 use crate::sensors::{CameraMount, CameraRig, GimbalRig, ImuIntrinsics, ImuNoise, ImuRig, RequiredAccuracy, Rig};
@@ -52,10 +53,7 @@ impl SensorFile {
             return Ok(None);
         }
         let text = read_description(&path, "read the sensor's description")?;
-        // OpenCV's files start with `%YAML:1.0`, which is not a YAML directive.
-        let text = without_bom(&text);
-        let text = if text.starts_with("%YAML:") { text.split_once('\n').map_or("", |(_, rest)| rest) } else { text };
-        let document = serde_saphyr::from_str(text).map_err(|error| {
+        let document = serde_saphyr::from_str(&without_opencv_head(without_bom(&text))).map_err(|error| {
             let problem = error.to_string();
             FileError::RigSyntax { problem: problem.lines().next().unwrap_or_default().to_owned(), path: path.clone() }
         })?;

@@ -17,22 +17,22 @@ const MAX_ENTRIES: usize = 5000;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RigCandidate {
     pub path: PathBuf,
-    /// True for a camera chain of Kalibr.
+    /// True for a camera chain of Kalibr or OpenVINS.
     pub is_kalibr: bool,
     /// Cameras and joints of the rig, or the reason why the log cannot be read with it.
     pub description: Result<String, String>,
 }
 
-/// True for the name of a rig: `*.rig.yaml`, `rig.yaml`, or a camera chain of Kalibr.
+/// True for the name of a rig: `*.rig.yaml`, `rig.yaml`, or a camera chain of Kalibr or OpenVINS.
 pub fn is_rig_name(path: &Path) -> bool {
     let name = log_name(path).to_ascii_lowercase();
     let is_yaml = [".yaml", ".yml"].iter().any(|ending| name.ends_with(ending));
-    is_yaml && (name.contains("rig.y") || name.contains("camchain"))
+    is_yaml && (name.contains("rig.y") || kalibr::is_chain_name(&name))
 }
 
-/// True if a file has one of the names that Kalibr gives to the IMU of this camera chain, in the same folder.
+/// True if a file has one of the names of the IMU of this camera chain, in the same folder.
 pub fn is_imu_file_of(path: &Path, camera_chain: &Path) -> bool {
-    log_name(camera_chain).to_ascii_lowercase().contains("camchain")
+    kalibr::is_chain_name(&log_name(camera_chain).to_ascii_lowercase())
         && kalibr::imu_files(camera_chain).iter().any(|file| file == path)
 }
 
