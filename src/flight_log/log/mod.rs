@@ -12,9 +12,9 @@ use super::container::file::LogFile;
 use super::container::{BlockCache, ContainerIndex, DecodedBlock, MessagePosition, MessageSpan, TopicIndex};
 use super::error::list;
 use super::grey_levels::GreyLevels;
-use super::messages::{self, MessageKind};
+use super::messages::{self, AttitudeLayout, MessageKind};
 use super::{LogError, LogWarning, WarningKind};
-use crate::files::{LimitExceeded, LimitKind, LogLimits};
+use crate::files::{FileError, LimitExceeded, LimitKind, LogLimits};
 use crate::geometry::seconds_from_ns;
 use crate::text::{log_name, without_signed_zeros};
 
@@ -173,6 +173,20 @@ impl FlightLog {
                 path,
             }),
         }
+    }
+
+    /// Layout of the attitudes of a topic, which a field of the rig names.
+    ///
+    /// # Errors
+    /// If messages of PX4 lack a field by their definition in the log.
+    pub(crate) fn attitude_layout(&self, field: &str, info: &TopicInfo) -> Result<AttitudeLayout, LogError> {
+        let channel = self.channel_ids.get(&info.topic).and_then(|ids| self.index.channels.get(ids.first()?));
+        let definition = channel.and_then(|channel| channel.definition.as_deref()).unwrap_or_default();
+        let kind = info.kind.unwrap_or(MessageKind::QuaternionStamped);
+        AttitudeLayout::of(kind, definition).map_err(|problem| {
+            let problem = format!("messages of '{}' ({}) are not read: {problem}", info.topic, kind.schema_name());
+            FileError::Rig { field: field.to_owned(), problem, path: self.path.clone() }.into()
+        })
     }
 
     /// Topic of one of these kinds whose messages are not read in their encoding.

@@ -3,7 +3,7 @@
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use super::cdr::{CdrError, CdrReader};
-use super::{MessageKind, read_header, read_px4_stamp};
+use super::{AttitudeLayout, MessageKind, read_header, read_px4_stamp};
 use crate::sensors::AttitudeValue;
 
 /// Largest number of transforms in a message; robots publish some dozens.
@@ -25,20 +25,23 @@ fn rotation([x, y, z, w]: [f64; 4]) -> Option<UnitQuaternion<f64>> {
 }
 
 /// Reads a quaternion of PX4, which begins with w.
-fn read_px4_rotation(reader: &mut CdrReader<'_>) -> Result<Option<UnitQuaternion<f64>>, CdrError> {
+fn read_px4_rotation(
+    layout: AttitudeLayout,
+    reader: &mut CdrReader<'_>,
+) -> Result<Option<UnitQuaternion<f64>>, CdrError> {
+    reader.go_to(layout.rotation);
     let [w, x, y, z] = reader.read_f32s::<4>()?.map(f64::from);
     Ok(rotation([x, y, z, w]))
 }
 
 /// Skips to the orientation of a message with a header and reads it.
 fn read_stamped_rotation(
-    kind: MessageKind,
+    layout: AttitudeLayout,
     reader: &mut CdrReader<'_>,
 ) -> Result<(i64, Option<UnitQuaternion<f64>>), CdrError> {
+    let kind = layout.kind;
     if kind == MessageKind::Px4VehicleAttitude {
-        let stamp_ns = read_px4_stamp(reader)?;
-        reader.read_u64()?; // stamp of the sample used for the estimate
-        return Ok((stamp_ns, read_px4_rotation(reader)?));
+        return Ok((read_px4_stamp(reader)?, read_px4_rotation(layout, reader)?));
     }
     let header = read_header(reader)?;
     if matches!(kind, MessageKind::Odometry | MessageKind::TransformStamped) {
@@ -52,29 +55,35 @@ fn read_stamped_rotation(
 
 /// Reads the attitude of a gimbal from a message of any kind but `Transforms`.
 pub(crate) fn read_gimbal_attitude(
-    kind: MessageKind,
+    layout: AttitudeLayout,
     message: &[u8],
 ) -> Result<StampedRotation<AttitudeValue>, CdrError> {
     let mut reader = CdrReader::new(message)?;
     let reader = &mut reader;
-    let (stamp_ns, content) = match kind {
+    let (stamp_ns, content) = match layout.kind {
         MessageKind::Vector3Stamped => {
             let header = read_header(reader)?;
             let vector = Vector3::from(reader.read_f64s::<3>()?);
             let finite = vector.iter().all(|value| value.is_finite());
             (header.stamp_ns, finite.then_some(AttitudeValue::Vector(vector)))
         }
-        MessageKind::MavrosGimbalAttitude | MessageKind::Px4GimbalAttitude => {
-            let px4 = kind == MessageKind::Px4GimbalAttitude;
-            let stamp_ns = if px4 { read_px4_stamp(reader)? } else { read_header(reader)?.stamp_ns };
+        MessageKind::Px4GimbalAttitude => {
+            let stamp_ns = read_px4_stamp(reader)?;
+            reader.go_to(layout.flags);
+            let flags = reader.read_u16()?;
+            let rotation = read_px4_rotation(layout, reader)?;
+            (stamp_ns, rotation.map(|rotation| AttitudeValue::Flagged(rotation, flags)))
+        }
+        MessageKind::MavrosGimbalAttitude => {
+            let header = read_header(reader)?;
             reader.read_u8()?; // target_system
             reader.read_u8()?; // target_component
             let flags = reader.read_u16()?;
-            let rotation = if px4 { read_px4_rotation(reader)? } else { rotation(reader.read_f64s::<4>()?) };
-            (stamp_ns, rotation.map(|rotation| AttitudeValue::Flagged(rotation, flags)))
+            let rotation = rotation(reader.read_f64s::<4>()?);
+            (header.stamp_ns, rotation.map(|rotation| AttitudeValue::Flagged(rotation, flags)))
         }
         _ => {
-            let (stamp_ns, rotation) = read_stamped_rotation(kind, reader)?;
+            let (stamp_ns, rotation) = read_stamped_rotation(layout, reader)?;
             (stamp_ns, rotation.map(AttitudeValue::Rotation))
         }
     };
@@ -83,12 +92,12 @@ pub(crate) fn read_gimbal_attitude(
 
 /// Reads the attitude of a vehicle, `earth_from_vehicle`, from a message of any kind with an orientation.
 pub(crate) fn read_vehicle_attitude(
-    kind: MessageKind,
+    layout: AttitudeLayout,
     message: &[u8],
 ) -> Result<StampedRotation<UnitQuaternion<f64>>, CdrError> {
     let mut reader = CdrReader::new(message)?;
-    let (stamp_ns, mut content) = read_stamped_rotation(kind, &mut reader)?;
-    if kind == MessageKind::Imu {
+    let (stamp_ns, mut content) = read_stamped_rotation(layout, &mut reader)?;
+    if layout.kind == MessageKind::Imu {
         // A first covariance of −1 means that there is no orientation.
         let [first, ..] = reader.read_f64s::<9>()?;
         content = content.filter(|_| first >= 0.0);

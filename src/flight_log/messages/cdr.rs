@@ -68,6 +68,11 @@ impl<'a> CdrReader<'a> {
         self.message.get(self.position..).unwrap_or_default()
     }
 
+    /// Goes to an offset from the end of the encapsulation header, from which on fields are read.
+    pub(super) fn go_to(&mut self, offset: usize) {
+        self.position = ENCAPSULATION + offset;
+    }
+
     fn align(&mut self, size: usize) {
         let offset = self.position - ENCAPSULATION;
         self.position = ENCAPSULATION + offset.next_multiple_of(size);

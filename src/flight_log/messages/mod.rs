@@ -3,8 +3,10 @@
 mod attitudes;
 pub(crate) mod cdr;
 pub(crate) mod protobuf;
+mod px4;
 mod video_codec;
 
+pub(crate) use self::px4::AttitudeLayout;
 pub(crate) use self::video_codec::VideoCodec;
 pub(crate) use attitudes::{bare_name, read_gimbal_attitude, read_transforms, read_vehicle_attitude};
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::UnitQuaternion;
 
 use super::super::log::relative_ns;
-use super::super::messages::{self, MessageKind};
+use super::super::messages::{self, AttitudeLayout};
 use super::super::{FlightLog, LogError, LogWarning, Magnitude, WarningKind};
 use super::ordered::{Decoder, Lookup, MessageSource, OrderedSamples};
 use super::read_context::{ReadContext, Refusal};
@@ -92,7 +92,7 @@ impl AttitudeJoints {
         from_ns: i64,
     ) -> Result<Self, LogError> {
         let info = log.require_topic(attitude::topic_field(gimbal), topic, attitude::gimbal_kinds(gimbal))?;
-        let kind = info.kind.unwrap_or(MessageKind::QuaternionStamped);
+        let layout = log.attitude_layout(attitude::topic_field(gimbal), info)?;
         let mut warnings = Vec::new();
         let readings = if let AttitudeMessage::Transforms { parent, child } = &source.message {
             let path = TransformPath::find(log, topic, parent, child)?;
@@ -101,18 +101,18 @@ impl AttitudeJoints {
             GimbalReadings::Transforms { samples, merge: TransformMerge::new(path), ended: false }
         } else {
             let clock = match StampClock::of_rig(gimbal.use_log_time) {
-                StampClock::Stamps => StampClock::of(log, topic, kind)?,
+                StampClock::Stamps => StampClock::of(log, topic, layout.kind)?,
                 given => given,
             };
             warnings.extend(clock.warning(topic).map(|warning| (topic.to_owned(), warning)));
-            GimbalReadings::Messages(OrderedSamples::new(log, topic, from_ns, false, value_decoder(kind, clock)))
+            GimbalReadings::Messages(OrderedSamples::new(log, topic, from_ns, false, value_decoder(layout, clock)))
         };
         let vehicle = match attitude::vehicle_topic(log, source)? {
             None => None,
-            Some((vehicle, kind)) => {
-                let clock = StampClock::of(log, vehicle, kind)?;
+            Some((vehicle, layout)) => {
+                let clock = StampClock::of(log, vehicle, layout.kind)?;
                 warnings.extend(clock.warning(vehicle).map(|warning| (vehicle.to_owned(), warning)));
-                let decoder = vehicle_decoder(source.clone(), kind, clock);
+                let decoder = vehicle_decoder(source.clone(), layout, clock);
                 // The gimbal's stamps may be shifted back relative to these, and its messages recorded later.
                 let shift_ns = ns_from_seconds(gimbal.timeshift_gimbal_imu_s).min(0);
                 let from_ns = from_ns.saturating_add(shift_ns).saturating_sub(VEHICLE_MARGIN_NS);
@@ -245,19 +245,19 @@ impl GimbalReadings {
     }
 }
 
-fn value_decoder(kind: MessageKind, clock: StampClock) -> Decoder<AttitudeValue> {
+fn value_decoder(layout: AttitudeLayout, clock: StampClock) -> Decoder<AttitudeValue> {
     Box::new(move |source: MessageSource<'_>| {
         let message =
-            messages::read_gimbal_attitude(kind, source.data).map_err(|error| Refusal::not_decodable(&error))?;
+            messages::read_gimbal_attitude(layout, source.data).map_err(|error| Refusal::not_decodable(&error))?;
         let refusal = || Refusal { reason: "not an attitude", detail: "not finite, or a zero quaternion".into() };
         let value = message.content.ok_or_else(refusal)?;
         Ok((clock.stamp_ns(message.stamp_ns, source.position.log_time_ns), value))
     })
 }
 
-fn vehicle_decoder(rig: AttitudeSource, kind: MessageKind, clock: StampClock) -> Decoder<UnitQuaternion<f64>> {
+fn vehicle_decoder(rig: AttitudeSource, layout: AttitudeLayout, clock: StampClock) -> Decoder<UnitQuaternion<f64>> {
     Box::new(move |source: MessageSource<'_>| {
-        let (stamp_ns, rotation) = attitude::read_vehicle(&rig, kind, source.data)
+        let (stamp_ns, rotation) = attitude::read_vehicle(&rig, layout, source.data)
             .map_err(|detail| Refusal { reason: "it is no attitude of the vehicle", detail })?;
         Ok((clock.stamp_ns(stamp_ns, source.position.log_time_ns), rotation))
     })

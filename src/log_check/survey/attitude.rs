@@ -7,7 +7,7 @@ use crate::flight_log::joints::attitude::{
     MAX_VEHICLE_GAP_NS, TransformMerge, TransformPath, gimbal_kinds, rotation_at, topic_field, vehicle_topic,
 };
 use crate::flight_log::log::relative_ns;
-use crate::flight_log::messages::{self, MessageKind};
+use crate::flight_log::messages::{self, AttitudeLayout, MessageKind};
 use crate::flight_log::stamps::clock::StampClock;
 use crate::flight_log::{FlightLog, LogError};
 use crate::geometry::ns_from_seconds;
@@ -20,12 +20,13 @@ const MAX_GAP_NS: i64 = 300_000_000;
 #[derive(Debug)]
 pub(crate) struct AttitudeSurvey {
     topic: String,
+    layout: AttitudeLayout,
     clock: StampClock,
     /// For a gimbal attitude in transforms, otherwise `None`.
     merge: Option<(TransformPath, TransformMerge)>,
     /// Rotations of the moving transforms of the path, in the order of log times.
     moved: Vec<(usize, i64, UnitQuaternion<f64>)>,
-    vehicle_topic: Option<(String, MessageKind, StampClock)>,
+    vehicle_topic: Option<(String, AttitudeLayout, StampClock)>,
     /// Attitudes with the stamps of their messages, ordered by stamp.
     pub(crate) values: Vec<(i64, AttitudeValue)>,
     /// `earth_from_vehicle` as recorded, ordered by stamp.
@@ -48,8 +49,9 @@ impl AttitudeSurvey {
     pub(crate) fn new(log: &FlightLog, gimbal: &GimbalRig) -> Result<Option<Self>, LogError> {
         let (Some(source), Some(topic)) = (&gimbal.attitude, &gimbal.topic) else { return Ok(None) };
         let info = log.require_topic(topic_field(gimbal), topic, gimbal_kinds(gimbal))?;
+        let layout = log.attitude_layout(topic_field(gimbal), info)?;
         let clock = match StampClock::of_rig(gimbal.use_log_time) {
-            StampClock::Stamps => StampClock::of(log, topic, info.kind.unwrap_or(MessageKind::QuaternionStamped))?,
+            StampClock::Stamps => StampClock::of(log, topic, layout.kind)?,
             given => given,
         };
         let mut warnings: Vec<String> = clock.warning(topic).into_iter().collect();
@@ -68,14 +70,15 @@ impl AttitudeSurvey {
             _ => Err(error),
         })? {
             None => None,
-            Some((topic, kind)) => {
-                let clock = StampClock::of(log, topic, kind)?;
+            Some((topic, layout)) => {
+                let clock = StampClock::of(log, topic, layout.kind)?;
                 warnings.extend(clock.warning(topic));
-                Some((topic.to_owned(), kind, clock))
+                Some((topic.to_owned(), layout, clock))
             }
         };
         Ok(Some(Self {
             topic: topic.clone(),
+            layout,
             clock,
             merge,
             moved: Vec::new(),
@@ -95,14 +98,7 @@ impl AttitudeSurvey {
 
     /// Reads a message of any topic; `stamp_ns` and the stamps within it are relative to the log's start. Returns the
     /// problem of an invalid message.
-    pub(crate) fn take(
-        &mut self,
-        topic: &str,
-        kind: MessageKind,
-        stamp_ns: i64,
-        epoch_ns: i64,
-        data: &[u8],
-    ) -> Result<(), String> {
+    pub(crate) fn take(&mut self, topic: &str, stamp_ns: i64, epoch_ns: i64, data: &[u8]) -> Result<(), String> {
         const NO_ATTITUDE: &str = "the attitude is not finite, a zero quaternion, or marked as unknown";
         if topic == self.topic {
             if let Some((path, _)) = &self.merge {
@@ -116,12 +112,12 @@ impl AttitudeSurvey {
                     self.moved.push((transform, entry_ns, rotation));
                 }
             } else {
-                let message = messages::read_gimbal_attitude(kind, data).map_err(|error| error.to_string())?;
+                let message = messages::read_gimbal_attitude(self.layout, data).map_err(|error| error.to_string())?;
                 self.values.push((stamp_ns, message.content.ok_or(NO_ATTITUDE)?));
             }
         }
-        if self.vehicle_topic.as_ref().is_some_and(|(vehicle, ..)| vehicle == topic) {
-            let message = messages::read_vehicle_attitude(kind, data).map_err(|error| error.to_string())?;
+        if let Some((_, layout, _)) = self.vehicle_topic.as_ref().filter(|(vehicle, ..)| vehicle == topic) {
+            let message = messages::read_vehicle_attitude(*layout, data).map_err(|error| error.to_string())?;
             self.vehicle.push((stamp_ns, message.content.ok_or(NO_ATTITUDE)?));
         }
         Ok(())
@@ -150,14 +146,15 @@ impl AttitudeSurvey {
 
     /// Attitude of the vehicle in FLU and ENU at a stamp.
     fn enu_from_flu(&self, source: &AttitudeSource, stamp_ns: i64) -> Option<UnitQuaternion<f64>> {
-        let (_, kind, _) = self.vehicle_topic.as_ref()?;
+        let (_, layout, _) = self.vehicle_topic.as_ref()?;
         let rotation = rotation_at(&self.vehicle, stamp_ns, MAX_VEHICLE_GAP_NS)?;
-        Some(source.enu_from_flu(&rotation, *kind == MessageKind::Px4VehicleAttitude))
+        Some(source.enu_from_flu(&rotation, layout.kind == MessageKind::Px4VehicleAttitude))
     }
 
     /// Attitudes `enu_from_flu` of the vehicle, ordered by stamp.
     pub(crate) fn vehicle_in_enu(&self, source: &AttitudeSource) -> Vec<(i64, UnitQuaternion<f64>)> {
-        let of_px4 = self.vehicle_topic.as_ref().is_some_and(|(_, kind, _)| *kind == MessageKind::Px4VehicleAttitude);
+        let of_px4 =
+            self.vehicle_topic.as_ref().is_some_and(|(_, layout, _)| layout.kind == MessageKind::Px4VehicleAttitude);
         self.vehicle.iter().map(|(stamp_ns, rotation)| (*stamp_ns, source.enu_from_flu(rotation, of_px4))).collect()
     }
 
@@ -191,6 +188,7 @@ impl AttitudeSurvey {
         };
         Self {
             topic: self.topic.clone(),
+            layout: self.layout,
             clock: self.clock,
             merge: None,
             moved: Vec::new(),

@@ -283,7 +283,7 @@ impl Survey {
             }
         }
         if let Some(attitude) = &mut self.attitude
-            && let Err(problem) = attitude.take(topic, kind, stamp_ns, log.epoch_ns(), data)
+            && let Err(problem) = attitude.take(topic, stamp_ns, log.epoch_ns(), data)
         {
             entry.refuse(problem);
         }

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, VecDeque};
 use nalgebra::UnitQuaternion;
 
 use crate::files::FileError;
-use crate::flight_log::messages::{MessageKind, bare_name, read_transforms};
+use crate::flight_log::messages::{AttitudeLayout, MessageKind, bare_name, read_transforms};
 use crate::flight_log::{FlightLog, LogError, messages};
 use crate::sensors::{AttitudeFrame, AttitudeMessage, AttitudeSource, BodyAxes, GimbalRig};
 
@@ -40,11 +40,11 @@ pub(crate) fn topic_field(gimbal: &GimbalRig) -> &'static str {
     if gimbal.attitude.is_some() { "gimbal.source.topic" } else { "gimbal.rostopic" }
 }
 
-/// Returns the topic and message type of the vehicle's attitude, `None` if every attitude is relative to the body.
+/// Returns the topic and message layout of the vehicle's attitude, `None` if every attitude is relative to the body.
 pub(crate) fn vehicle_topic<'a>(
     log: &FlightLog,
     source: &'a AttitudeSource,
-) -> Result<Option<(&'a str, MessageKind)>, LogError> {
+) -> Result<Option<(&'a str, AttitudeLayout)>, LogError> {
     let Some(topic) = source.vehicle_topic.as_deref().filter(|_| source.frame != AttitudeFrame::Body) else {
         return Ok(None);
     };
@@ -60,7 +60,7 @@ pub(crate) fn vehicle_topic<'a>(
         let field = "gimbal.source.vehicle_axes".to_owned();
         return Err(FileError::Rig { field, problem, path: log.path().to_owned() }.into());
     }
-    Ok(Some((topic, kind)))
+    Ok(Some((topic, log.attitude_layout("gimbal.source.vehicle", info)?)))
 }
 
 /// Interpolates samples, in the order of their stamps, at a stamp by [`rotation_between`].
@@ -98,12 +98,12 @@ pub(crate) fn rotation_between(
 /// description of the problem.
 pub(crate) fn read_vehicle(
     source: &AttitudeSource,
-    kind: MessageKind,
+    layout: AttitudeLayout,
     message: &[u8],
 ) -> Result<(i64, UnitQuaternion<f64>), String> {
-    let attitude = messages::read_vehicle_attitude(kind, message).map_err(|error| error.to_string())?;
+    let attitude = messages::read_vehicle_attitude(layout, message).map_err(|error| error.to_string())?;
     let rotation = attitude.content.ok_or("not finite, a zero quaternion, or marked as unknown")?;
-    Ok((attitude.stamp_ns, source.enu_from_flu(&rotation, kind == MessageKind::Px4VehicleAttitude)))
+    Ok((attitude.stamp_ns, source.enu_from_flu(&rotation, layout.kind == MessageKind::Px4VehicleAttitude)))
 }
 
 /// Number of messages of a topic within which every frame must occur.
