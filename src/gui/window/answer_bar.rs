@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use egui::{Align, Button, Label, Layout as UiLayout, RichText, Sense, Ui};
+use egui::{Align, Button, Label, Layout as UiLayout, RichText, Role, Sense, Ui, WidgetInfo};
 
 use super::actions::Action;
 use crate::gimbal::ParameterId;
@@ -55,6 +55,9 @@ pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, actions: &mut Vec<Acti
             let sense = if shown.is_some() { Sense::click() } else { Sense::hover() };
             let label = ui.add(Label::new(sentence.color(color).strong()).truncate().sense(sense));
             let label = label.on_hover_text(hover_text(&answer));
+            if shown.is_some() {
+                label.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("{of_run}{text}")));
+            }
             if let Some(shown) = shown.filter(|_| label.clicked()) {
                 shown.show(ctx);
             }
