@@ -578,7 +578,7 @@ fn a_camera_chain_of_openvins_is_read_as_one_of_kalibr() {
     // Lines keep their numbers.
     fs::write(&openvins, chain.replace("752", "wide")).unwrap();
     let message = Rig::from_file(&openvins).unwrap_err().to_string();
-    assert!(message.contains("cam0.resolution") && message.contains("line 13"), "{message}");
+    assert!(message.contains("cam0.resolution") && message.contains("line 14"), "{message}");
 }
 
 #[test]
