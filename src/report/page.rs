@@ -199,13 +199,13 @@ fn why_lines(parameters: &[FlightParameter]) -> Vec<String> {
     let line = |remedy: &str| {
         let of_remedy: Vec<&FlightParameter> = explained().filter(|it| it.remedy == remedy).collect();
         let alike = of_remedy.chunk_by(|a, b| a.verdict == Determination::Redundant && verdict(a) == verdict(b));
-        let reasons = alike.map(|parameters| match parameters {
-            [parameter] => format!("{}, {}: {}", parameter.name, verdict(parameter), parameter.reason),
-            _ => {
-                let named = parameters.iter().map(|it| format!("{} ({})", it.name, it.reason));
-                let verdict = parameters.first().map(|first| verdict(first)).unwrap_or_default();
-                format!("{verdict}: {}", named.collect::<Vec<_>>().join(", "))
+        let reasons = alike.map(|parameters| {
+            if let [parameter] = parameters {
+                return format!("{}, {}: {}", parameter.name, verdict(parameter), parameter.reason);
             }
+            let named = parameters.iter().map(|it| format!("{} ({})", it.name, it.reason));
+            let verdict = parameters.first().map(|first| verdict(first)).unwrap_or_default();
+            format!("{verdict}: {}", named.collect::<Vec<_>>().join(", "))
         });
         let helps = if remedy.is_empty() { String::new() } else { format!(" · {remedy}") };
         format!("{}{helps}", reasons.collect::<Vec<_>>().join("; "))

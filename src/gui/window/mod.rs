@@ -173,7 +173,7 @@ pub fn window_ui(ui: &mut Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>
 
 /// Draws what lies above the panels: dialogs, messages, tour, help and menus.
 fn above_panels_ui(
-    ui: &mut Ui,
+    ui: &Ui,
     state: &mut MainWindow,
     ctx: &mut PanelContext<'_>,
     clicks: &TabClicks,
