@@ -18,7 +18,7 @@ macro_rules! document {
 }
 
 /// The manual is first.
-const DOCUMENTS: [Document; 29] = [
+const DOCUMENTS: [Document; 30] = [
     document!("docs/manual.md"),
     document!("docs/tutorial.md"),
     document!("docs/recordings.md"),
@@ -47,6 +47,7 @@ const DOCUMENTS: [Document; 29] = [
     document!("docs/experiments/heading_in_an_orbit.md"),
     document!("docs/experiments/planned_motions.md"),
     document!("docs/experiments/sigma_of_the_calibration.md"),
+    document!("docs/experiments/a_thousand_faults.md"),
     document!("docs/experiments/archive.md"),
 ];
 
