@@ -42,7 +42,11 @@ fn a_parameter_offers_its_start_a_breakpoint_and_a_fork() {
     let place = |harness: &Harness<'static, Bench>| {
         harness
             .get_all_by_label_contains(&format!("{name} "))
-            .find(|node| node.accesskit_node().role() == Role::Button)
+            .find(|node| {
+                // The sentence of the bar may name it as well.
+                let node = node.accesskit_node();
+                node.role() == Role::Button && node.label().is_some_and(|label| label.starts_with(&name))
+            })
             .unwrap()
             .rect()
     };
