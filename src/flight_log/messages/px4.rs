@@ -52,7 +52,8 @@ fn place_of(definition: &str, name: &str, of_type: &str) -> Option<usize> {
             continue;
         }
         let (number, count) = match field_type.split_once('[') {
-            Some((number, count)) => (number, count.strip_suffix(']')?.parse::<usize>().ok()?),
+            // Short enough that no offset overflows, whatever the definition says.
+            Some((number, count)) => (number, usize::from(count.strip_suffix(']')?.parse::<u16>().ok()?)),
             None => (field_type, 1),
         };
         let size = size_of_number(number)?;
@@ -60,7 +61,7 @@ fn place_of(definition: &str, name: &str, of_type: &str) -> Option<usize> {
         if field == name {
             return (field_type == of_type).then_some(offset);
         }
-        offset = offset.checked_add(size.checked_mul(count)?)?;
+        offset += size * count;
     }
     None
 }
@@ -95,6 +96,7 @@ mod tests {
             ("uint64 timestamp\nstring name\nfloat32[4] q\n", "has no 'float32[4] q'"),
             ("uint64 timestamp_sample\nuint64 timestamp\nfloat32[4] q\n", "does not begin with 'uint64 timestamp'"),
             ("float32[4] q\n", "has no 'uint64 timestamp'"),
+            ("uint64 timestamp\nuint8[18446744073709551607] a\nfloat32[4] q\n", "has no 'float32[4] q'"),
         ] {
             assert!(places(vehicle, definition).unwrap_err().ends_with(lacks), "{definition}");
         }

@@ -49,18 +49,18 @@ pub(crate) fn vehicle_topic<'a>(
         return Ok(None);
     };
     let info = log.require_topic("gimbal.source.vehicle", topic, &VEHICLE_KINDS)?;
-    let kind = info.kind.unwrap_or(MessageKind::QuaternionStamped);
+    let layout = log.attitude_layout("gimbal.source.vehicle", info)?;
     // By ROS conventions these are in FLU, but not all programs follow them.
-    let conventional = matches!(kind, MessageKind::Imu | MessageKind::Odometry);
+    let conventional = matches!(layout.kind, MessageKind::Imu | MessageKind::Odometry);
     if conventional && source.axes == BodyAxes::Frd && source.vehicle_axes.is_none() {
         let problem = format!(
             "missing, expected frd or flu: '{topic}' is a {}, which should be in flu (ENU), and gimbal.source.axes is frd",
-            kind.schema_name()
+            layout.kind.schema_name()
         );
         let field = "gimbal.source.vehicle_axes".to_owned();
         return Err(FileError::Rig { field, problem, path: log.path().to_owned() }.into());
     }
-    Ok(Some((topic, log.attitude_layout("gimbal.source.vehicle", info)?)))
+    Ok(Some((topic, layout)))
 }
 
 /// Interpolates samples, in the order of their stamps, at a stamp by [`rotation_between`].
