@@ -78,16 +78,21 @@ impl RankReport {
         }
     }
 
-    /// Summary in one line: `structural rank 18 of 24; 6 redundant in the parameterization; informed rank 15; least observable yaw.d`.
-    pub fn verdict(&self, names: &ParameterNames) -> String {
+    /// Number of null directions with each cause: `6 redundant in the parameterization`; empty without a deficit.
+    pub fn deficit_texts(&self) -> Vec<String> {
         let causes = [
             (self.deficit_parameterization, "redundant in the parameterization"),
             (self.deficit_joints, "lost to stationary joints"),
             (self.deficit_absorbed, "absorbed by free joint angles"),
             (self.deficit_motion, "lost to the vehicle's motion"),
         ];
+        causes.iter().filter(|(count, _)| *count > 0).map(|(count, cause)| format!("{count} {cause}")).collect()
+    }
+
+    /// Summary in one line: `structural rank 18 of 24; 6 redundant in the parameterization; informed rank 15; least observable yaw.d`.
+    pub fn verdict(&self, names: &ParameterNames) -> String {
         let mut parts = vec![format!("structural rank {} of {}", self.rank_structural, self.parameters.len())];
-        parts.extend(causes.iter().filter(|(count, _)| *count > 0).map(|(count, cause)| format!("{count} {cause}")));
+        parts.extend(self.deficit_texts());
         parts.push(format!("informed rank {}", self.rank_informed));
         if let Some(parameter) = self.least_observable() {
             let direction = self.least_observable_direction();

@@ -72,14 +72,7 @@ pub(super) fn observability(recording: &Recording, run: &RunRecord, answer: &Ans
 
 /// Causes of null and of uninformed directions.
 fn why(rank: &RankReport, step: &StepRecord) -> Vec<String> {
-    let causes = [
-        (rank.deficit_parameterization, "redundant in the parameterization"),
-        (rank.deficit_joints, "lost to stationary joints"),
-        (rank.deficit_absorbed, "absorbed by free joint angles"),
-        (rank.deficit_motion, "lost to the vehicle's motion"),
-    ];
-    let named = causes.iter().filter(|(count, _)| *count > 0).map(|(count, cause)| format!("{count} {cause}"));
-    let named: Vec<String> = named.collect();
+    let named = rank.deficit_texts();
     let mut reasons = Vec::new();
     if !named.is_empty() {
         reasons.push(format!("Unobservable directions: {}.", named.join(", ")));
