@@ -213,7 +213,8 @@ def run(
     specifications). `out` receives one folder per run; without it the files are in a temporary folder that lives as long
     as the result. `stop_when` is the condition of `--break`, `require` the accuracy of `--require`, such as
     `"translation=5mm,rotation=0.1deg"`, or `True` for the accuracy of the rig; `Run.answer` then says whether it is reached.
-    `timing=False` omits measured times, so that two runs give the same bytes. A run that never initialized is a result with `initialized` false.
+    `timing=False` omits measured times, so that two runs give the same bytes. A run that never initialized is a result
+    with `initialized` false.
     """
     specifications = texts(runs) or []
     arm = lever_arm if lever_arm is None or isinstance(lever_arm, str) else ",".join(map(str, lever_arm))

@@ -72,8 +72,8 @@ pub(crate) fn read_camera_chain(
     })
 }
 
-/// Transform `camera_from_imu`: `T_cam_imu`, the inverse of `T_imu_cam` (OpenVINS), else the transform of the previous camera followed by `T_cn_cnm1`, from
-/// the previous camera to this one.
+/// Transform `camera_from_imu`: `T_cam_imu`, else the inverse of `T_imu_cam` (OpenVINS), else the transform of the previous
+/// camera followed by `T_cn_cnm1`, from the previous camera to this one.
 fn camera_from_imu(camera: &Field<'_>, previous_from_imu: Option<RigidTransform>) -> Result<RigidTransform, FileError> {
     let (from_imu, from_previous) = (camera.field("T_cam_imu"), camera.field("T_cn_cnm1"));
     let imu_from_camera = camera.field("T_imu_cam");

@@ -203,7 +203,7 @@ fn check_imu(imu: &Located, path: &str, keys: &Keys, found: &mut Found) {
 fn check_camera(camera: &Located, path: &str, found: &mut Found) {
     check_mapping(camera, path, &CAMERA, found);
     if camera.get("mount").is_none() {
-        // OpenVINS's camera chain.
+        // A camera chain of OpenVINS has the inverse transform.
         found.unknown.retain(|(field, ..)| field.strip_suffix(".T_imu_cam") != Some(path));
     }
     if camera.get("T_cam_imu").is_none() {

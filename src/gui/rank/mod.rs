@@ -221,8 +221,8 @@ impl RankPanel {
             return false;
         };
         // No motion helps a run that is not trusted.
-        let withheld = ctx.answer(run).withheld();
-        if with_sentences && withheld.is_none_or(|it| step.report.stamp_ns < it.from_ns) {
+        let is_trusted = || ctx.answer(run).withheld().is_none_or(|it| step.report.stamp_ns < it.from_ns);
+        if with_sentences && is_trusted() {
             self.advice.ui(ui, ctx, step);
         }
         let left = bottom - ui.cursor().top();
