@@ -67,12 +67,12 @@ impl Flight {
 }
 
 /// Logs of the flights in a folder; each one's sound log is rendered once.
-pub(crate) struct Hangar {
+pub(crate) struct FlightLogs {
     folder: PathBuf,
     sound: BTreeMap<Flight, (PathBuf, Rig)>,
 }
 
-impl Hangar {
+impl FlightLogs {
     pub(crate) fn new(folder: &Path) -> Self {
         Self { folder: folder.to_owned(), sound: BTreeMap::new() }
     }
@@ -84,7 +84,7 @@ impl Hangar {
         let log = match &case.fault {
             None => sound,
             Some(fault) if is_of_rig(fault.kind) => {
-                spoil(&mut rig, flight.camera_key(), fault);
+                plant_in_rig(&mut rig, flight.camera_key(), fault);
                 sound
             }
             Some(fault) => self.planted(flight, fault, &sound)?,
@@ -154,7 +154,7 @@ fn copy(log: &Path, images: Option<&Path>, output: &Path) -> Result<()> {
 }
 
 /// Plants a fault of the rig: its values become those that the fault corrects.
-fn spoil(rig: &mut Rig, camera_key: &str, fault: &Fault) {
+fn plant_in_rig(rig: &mut Rig, camera_key: &str, fault: &Fault) {
     let undone = fault.value(0);
     match fault.kind {
         FaultKind::ImuNoise => {

@@ -18,7 +18,7 @@ use std::path::PathBuf;
 use anyhow::{Context as _, Result, bail};
 
 use cases::{cases, left_out};
-use flights::{Flight, Hangar};
+use flights::{Flight, FlightLogs};
 use matrix::{HEADER, Matrix};
 
 struct Arguments {
@@ -34,7 +34,7 @@ impl Arguments {
         while let Some(word) = words.next() {
             let mut value = || words.next().with_context(|| format!("{word} needs a value"));
             match word.as_str() {
-                // Cargo adds it.
+                // Cargo adds it for a bench of its own.
                 "--bench" => {}
                 "--csv" => arguments.csv = value()?.into(),
                 "--part" => {
@@ -54,14 +54,14 @@ impl Arguments {
 fn main() -> Result<()> {
     let arguments = Arguments::read(std::env::args().skip(1))?;
     let folder = tempfile::tempdir()?;
-    let mut hangar = Hangar::new(folder.path());
+    let mut logs = FlightLogs::new(folder.path());
     if arguments.part.is_none() || !arguments.csv.exists() {
         fs::write(&arguments.csv, format!("{HEADER}\n"))?;
     }
     let mut csv = OpenOptions::new().append(true).open(&arguments.csv)?;
     let (part, of) = arguments.part.unwrap_or((1, 1));
     for case in cases(&Flight::ALL)?.iter().skip(part - 1).step_by(of) {
-        let report = hangar.check(case)?;
+        let report = logs.check(case)?;
         writeln!(csv, "{}", matrix::line(case, &report))?;
     }
     println!("{}", Matrix::of(&fs::read_to_string(&arguments.csv)?));
