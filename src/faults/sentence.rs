@@ -125,6 +125,9 @@ impl Subject<'_> {
             ),
             FaultKind::UnusableImu => texts("the IMU's samples cannot be restored", "record the IMU's raw samples"),
             FaultKind::UnusableJoints => texts("the joint angles cannot be restored", "record the encoders' readings"),
+            FaultKind::UnusableImages => {
+                texts("the images cannot be restored", "record whole images in grey or colour")
+            }
         }
     }
 

@@ -63,6 +63,8 @@ pub enum FaultKind {
     UnusableImu,
     /// Joint angles that no constant correction restores.
     UnusableJoints,
+    /// Images that do not show the scene at one instant in grey values.
+    UnusableImages,
 }
 
 /// Sensor with the faulty measurements.
@@ -290,6 +292,7 @@ pub const TABLE: &[Row] = &[
     Row::new(FaultKind::EncoderNoise, "encoder_noise", Sensor::Joints, Area::Encoders).tried(NOISE_FACTORS),
     Row::new(FaultKind::UnusableImu, "unusable_imu", Sensor::Imu, Area::Imu).useless(0.0),
     Row::new(FaultKind::UnusableJoints, "unusable_joints", Sensor::Joints, Area::Encoders).useless(0.0),
+    Row::new(FaultKind::UnusableImages, "unusable_images", Sensor::Camera, Area::Images).useless(0.0),
 ];
 
 const NOISE_FACTORS: &[f64] = &[3.0, 10.0, 30.0];

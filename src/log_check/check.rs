@@ -40,6 +40,8 @@ pub fn check(log: &FlightLog, rig: Result<&Rig, &LogError>, image_rotations: &[I
     imu::axes::check_imu_axes(&imu_facts, &mut findings);
     let mut proposed_masks = Vec::new();
     if let Ok(rig) = rig {
+        let content_faults = images::content::check_content(&survey, rig, &mut findings);
+        let image_rotations = &images::content::of_intact_images(image_rotations, &content_faults, &mut findings)[..];
         if let Some(fitted) = gimbal::source_fit::check_source(&survey, rig, &imu_facts, image_rotations, &mut findings)
         {
             // Joints and cameras are checked with the corrected attitude.
@@ -49,7 +51,7 @@ pub fn check(log: &FlightLog, rig: Result<&Rig, &LogError>, image_rotations: &[I
         gimbal::check_joint_coverage(&survey, rig, &mut findings);
         gimbal::vehicle_attitude::check_vehicle_attitude(&survey, rig, &imu_facts, &mut findings);
         images::check_video_decoding(log, &survey, rig, &mut findings);
-        images::check_images(log, &survey, rig, &imu_facts, &mut findings);
+        images::check_images(log, &survey, rig, &imu_facts, &content_faults, &mut findings);
         stamps::copies::check_image_copies(&survey, rig, &imu_facts, &mut findings);
         gimbal::frozen_joints::check_frozen_joints(&survey, rig, &imu_facts, &mut findings);
         let rotations = extrinsics::check_rotations(&survey, rig, &imu_facts, image_rotations, &mut findings);

@@ -1,4 +1,5 @@
 mod clocks;
+mod content;
 mod gimbal_imu;
 mod unmeasured;
 
@@ -58,6 +59,8 @@ pub(super) struct Flight {
     pub(super) accelerometer_apart: bool,
     /// Topic with orientations only.
     pub(super) orientations: Option<&'static str>,
+    /// Encoding of the images, which may have several bytes per pixel.
+    pub(super) encoding: &'static str,
     /// Another message on the topic of the IMU, from the time in milliseconds and the sample of the first.
     pub(super) second_imu: fn(i64, ImuMessage) -> Option<ImuMessage>,
 }
@@ -75,6 +78,7 @@ impl Default for Flight {
             camera_info: [80.0, 80.0, 79.5, 59.5],
             accelerometer_apart: false,
             orientations: None,
+            encoding: "mono8",
             second_imu: |_, _| None,
         }
     }
@@ -164,7 +168,8 @@ impl Flight {
                 let mut image = texture(millisecond as usize / 50);
                 if (self.image)(millisecond, &mut times, &mut image) {
                     let size = [image.width, image.height];
-                    writer.write_raw_image("/camera/image", "camera", times, size, "mono8", &image.pixels).unwrap();
+                    let pixels = &image.pixels;
+                    writer.write_raw_image("/camera/image", "camera", times, size, self.encoding, pixels).unwrap();
                 }
                 writer.write_camera_info("/camera/camera_info", "camera", times, &model).unwrap();
             }

@@ -40,6 +40,29 @@ pub(crate) fn wide_values(kind: MessageKind, message: &[u8], limits: &LogLimits)
     Some(wide_gray(image).map_or(WideValues::Narrow, WideValues::Of))
 }
 
+/// Gray values of an image as its encoding states them, and with the bytes in the other order.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct ByteOrders {
+    pub(crate) stored: Vec<u16>,
+    /// With both bytes of each value exchanged; of packed YUV, the chroma in place of the luma.
+    pub(crate) exchanged: Vec<u16>,
+}
+
+/// Gray values of an image message in both orders of its bytes; `None` for values of one byte that are not packed YUV.
+pub(crate) fn byte_orders(kind: MessageKind, message: &[u8], limits: &LogLimits) -> Option<ByteOrders> {
+    if kind == MessageKind::Image {
+        let raw = read_image(message).ok()?;
+        let encoding = checked_encoding(&raw, limits, None).ok()?;
+        return Some(ByteOrders { exchanged: encoding.exchanged(&raw)?, stored: encoding.values(&raw) });
+    }
+    match wide_values(kind, message, limits)? {
+        WideValues::Of(stored) => {
+            Some(ByteOrders { exchanged: stored.iter().map(|value| value.swap_bytes()).collect(), stored })
+        }
+        WideValues::Narrow => None,
+    }
+}
+
 /// Gray values of a decoded image with 16 bits per sample, or the image itself.
 fn wide_gray(image: DynamicImage) -> Result<Vec<u16>, DynamicImage> {
     match image {

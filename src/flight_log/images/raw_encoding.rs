@@ -103,6 +103,18 @@ impl RawEncoding {
         self.mapped(raw, |value| value)
     }
 
+    /// [`Self::values`] with both bytes of each sample exchanged, or the chroma of packed YUV in place of its luma; `None` for
+    /// other encodings.
+    pub(super) fn exchanged(self, raw: &ImageMessage<'_>) -> Option<Vec<u16>> {
+        match self.layout {
+            PixelLayout::Luma { samples: 2, first } => {
+                Some(Self { layout: PixelLayout::Luma { samples: 2, first: 1 - first }, ..self }.values(raw))
+            }
+            _ if self.is_wide() => Some(self.values(&ImageMessage { big_endian: !raw.big_endian, ..raw.clone() })),
+            _ => None,
+        }
+    }
+
     fn mapped<T>(self, raw: &ImageMessage<'_>, narrow: impl Fn(u16) -> T + Copy) -> Vec<T> {
         if let PixelLayout::Bayer { red } = self.layout {
             let samples: Vec<u16> = self.rows(raw).flat_map(|row| self.samples(row, raw.big_endian)).collect();

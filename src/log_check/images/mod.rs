@@ -1,7 +1,11 @@
-//! Images of each camera: size, blur, exposure, texture, and the parts of a video that cannot be decoded.
+//! Images of each camera: size, content, blur, exposure, texture, and the parts of a video that cannot be decoded.
 
+pub(super) mod content;
 pub(super) mod still_pixels;
 
+use std::collections::BTreeMap;
+
+use self::content::ContentFault;
 use super::imu::ImuFacts;
 use super::report::{Area, Findings, Severity};
 use super::statistics::{median, percentile};
@@ -45,18 +49,33 @@ const DECODED_MESSAGES: usize = 2000;
 /// Maximum number of listed intervals.
 const LISTED_INTERVALS: usize = 3;
 
-/// Checks size, blur, exposure and texture of each camera's images, and their motion by rotation.
-pub(super) fn check_images(log: &FlightLog, survey: &Survey, rig: &Rig, imu_facts: &ImuFacts, findings: &mut Findings) {
+/// Checks the size of each camera's images, their motion by rotation, and blur, exposure and texture if their content is not
+/// broken.
+pub(super) fn check_images(
+    log: &FlightLog,
+    survey: &Survey,
+    rig: &Rig,
+    imu_facts: &ImuFacts,
+    faults: &BTreeMap<String, ContentFault>,
+    findings: &mut Findings,
+) {
     for camera in &rig.cameras {
         let Some(images) = survey.images.get(&camera.key).filter(|images| !images.is_empty()) else { continue };
         check_size(log, camera, images, findings);
+        check_motion(camera, imu_facts, findings);
+        let fault = faults.get(&camera.key);
+        if fault == Some(&ContentFault::Broken) {
+            continue;
+        }
         if let Some(levels) = survey.grey_levels.get(&camera.key) {
             note_grey_levels(camera, levels, findings);
         }
-        check_blur(camera, images, findings);
-        check_exposure(camera, images, findings);
+        // Gradients follow the brightness.
+        if fault.is_none() {
+            check_blur(camera, images, findings);
+            check_exposure(camera, images, findings);
+        }
         check_texture(camera, images, findings);
-        check_motion(camera, imu_facts, findings);
     }
 }
 

@@ -2,6 +2,7 @@
 
 pub(super) mod attitude;
 pub(super) mod gradient_sums;
+pub(super) mod image_content;
 mod imu_samples;
 pub(super) mod topic_survey;
 
@@ -12,6 +13,7 @@ use nalgebra::Vector3;
 
 use self::attitude::{AttitudeSurvey, SolvedAttitude};
 use self::gradient_sums::{GradientSums, ImageMeasure, measure};
+use self::image_content::{ContentSurvey, is_grouped};
 use self::imu_samples::{UnmeasuredStamps, measured};
 use self::topic_survey::{Times, TopicSurvey};
 use super::statistics::white_sigma;
@@ -47,6 +49,16 @@ const MIN_SIGMA_RAD: f64 = 1e-5;
 pub(crate) struct SampledImage {
     pub(crate) stamp_ns: i64,
     pub(crate) measure: ImageMeasure,
+}
+
+/// Place of a message in its topic.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    number: u64,
+    /// True for images whose sharpness, exposure and texture are measured.
+    is_sampled: bool,
+    /// True for images whose content is measured.
+    is_grouped: bool,
 }
 
 /// Data from one pass through the log.
@@ -93,6 +105,8 @@ pub(crate) struct Survey {
     pub(crate) grey_levels: BTreeMap<String, Arc<GreyLevels>>,
     /// Sums of the gradients of those images by camera key.
     pub(crate) gradients: BTreeMap<String, GradientSums>,
+    /// Measures of the content of some images by camera key.
+    pub(crate) content: BTreeMap<String, ContentSurvey>,
     /// Position and damage of each damaged chunk.
     pub(crate) damages: Vec<String>,
 }
@@ -134,7 +148,7 @@ impl Survey {
                 let stride = info.count.div_ceil(IMAGES_PER_CAMERA).max(1);
                 let data = decoded.bytes(&message.data);
                 // Of a video, only keyframes are sampled: other frames depend on previous ones.
-                let sampled = if kind.is_video() {
+                let is_sampled = if kind.is_video() {
                     let due = keyframes_due.entry(info.topic.clone()).or_default();
                     let sampled = *number >= *due
                         && messages::read_video_packet(kind, data).is_ok_and(|packet| packet.is_keyframe());
@@ -143,8 +157,10 @@ impl Survey {
                 } else {
                     number.is_multiple_of(stride)
                 };
+                let is_grouped = if kind.is_video() { is_sampled } else { is_grouped(*number, info.count) };
+                let place = Place { number: *number, is_sampled, is_grouped };
                 *number += 1;
-                survey.take(log, rig, &info.topic, kind, log.since_start(message.log_time_ns), data, sampled);
+                survey.take(log, rig, &info.topic, kind, log.since_start(message.log_time_ns), data, place);
             }
         }
         for topic in survey.topics.values_mut() {
@@ -234,7 +250,7 @@ impl Survey {
         kind: MessageKind,
         log_time_ns: i64,
         data: &[u8],
-        sampled: bool,
+        place: Place,
     ) {
         let entry = self
             .topics
@@ -311,14 +327,22 @@ impl Survey {
                 Err(error) => entry.refuse(error.to_string()),
             }
         }
-        if sampled && let Some(camera) = rig.cameras.iter().find(|camera| camera.topic == topic && kind.is_image()) {
+        let is_read = place.is_sampled || place.is_grouped;
+        if is_read && let Some(camera) = rig.cameras.iter().find(|camera| camera.topic == topic && kind.is_image()) {
             let levels = self.grey_levels.entry(camera.key.clone());
             let narrowing = levels.or_insert_with(|| grey_levels_of_topic(log, topic, kind)).at(log_time_ns);
             match decode_image(kind, data, narrowing, log.file().limits(), None) {
                 Ok(image) => {
-                    self.gradients.entry(camera.key.clone()).or_default().add(&image);
-                    let image = SampledImage { stamp_ns, measure: measure(&image) };
-                    self.images.entry(camera.key.clone()).or_default().push(image);
+                    if place.is_sampled {
+                        self.gradients.entry(camera.key.clone()).or_default().add(&image);
+                        let sampled = SampledImage { stamp_ns, measure: measure(&image) };
+                        self.images.entry(camera.key.clone()).or_default().push(sampled);
+                    }
+                    if place.is_grouped {
+                        let content = self.content.entry(camera.key.clone()).or_default();
+                        let orders = content.orders(kind, data, log.file().limits());
+                        content.add(place.number, stamp_ns, image, orders);
+                    }
                 }
                 Err(problem) => entry.refuse(problem.to_string()),
             }
