@@ -100,7 +100,7 @@ mod tests {
     use super::*;
     use crate::faults::{Choice, FaultKind, ImageFlip};
     use crate::geometry::SignedAxes;
-    use crate::log_check::{Area, Finding, FindingInterval, Severity};
+    use crate::log_check::{Agreement, Area, Finding, FindingInterval, Severity};
     use crate::simulation::{Experiment, SimulationOptions, simulate};
 
     fn short_log(folder: &Path) -> (Arc<FlightLog>, Rig) {
@@ -144,6 +144,7 @@ mod tests {
             duration_s: 14.3 / 3.0,
             topics: Vec::new(),
             findings: vec![finding(Severity::Error, false, faults), finding(Severity::Warning, true, Vec::new())],
+            agreement: Agreement::default(),
             proposed_masks: vec![ProposedMask { camera_key: "cam0".to_owned(), mask: ImageMask::from_image(&image) }],
         }
     }

@@ -1,5 +1,7 @@
 //! The checks in their order.
 
+use super::isolation::{Compared, isolate};
+use super::report::agreement::Agreement;
 use super::report::{Area, CheckReport, Findings, ImageRotation, Severity};
 use super::survey::Survey;
 use super::{extrinsics, gimbal, ground_truth, images, imu, rig_sanity, stamps, topics};
@@ -39,6 +41,7 @@ pub fn check(log: &FlightLog, rig: Result<&Rig, &LogError>, image_rotations: &[I
     let imu_facts = imu::check_imu(&survey, rig.ok(), &mut findings);
     imu::axes::check_imu_axes(&imu_facts, &mut findings);
     let mut proposed_masks = Vec::new();
+    let mut agreement = Agreement::default();
     if let Ok(rig) = rig {
         let content_faults = images::content::check_content(&survey, rig, &mut findings);
         let image_rotations = &images::content::of_intact_images(image_rotations, &content_faults, &mut findings)[..];
@@ -56,7 +59,18 @@ pub fn check(log: &FlightLog, rig: Result<&Rig, &LogError>, image_rotations: &[I
         gimbal::frozen_joints::check_frozen_joints(&survey, rig, &imu_facts, &mut findings);
         let rotations = extrinsics::check_rotations(&survey, rig, &imu_facts, image_rotations, &mut findings);
         gimbal::gimbal_imu::check_gimbal_imu(&survey, rig, image_rotations, &mut findings);
-        ground_truth::check_ground_truth(log, rig, &imu_facts, &rotations, &mut findings);
+        let poses = ground_truth::poses_of(log, rig);
+        ground_truth::check_ground_truth(&poses, rig, &imu_facts, &rotations.of_imu, &mut findings);
+        let compared = Compared {
+            survey: &survey,
+            rig,
+            imu_facts: &imu_facts,
+            joint_noise_ratios: survey.joint_noise_ratios(),
+            images: image_rotations,
+            measured: &rotations.measured,
+            poses: &poses,
+        };
+        agreement = isolate(&compared, &mut findings);
         proposed_masks = images::still_pixels::check_still_pixels(&survey, rig, image_rotations, &mut findings);
     }
     let mut findings = findings.list;
@@ -68,6 +82,7 @@ pub fn check(log: &FlightLog, rig: Result<&Rig, &LogError>, image_rotations: &[I
         duration_s: seconds_from_ns(log.duration_ns()),
         topics: topics::topic_reports(log, &survey, rig.ok()),
         findings,
+        agreement,
         proposed_masks,
     }
 }

@@ -10,6 +10,7 @@ mod gimbal;
 mod ground_truth;
 mod images;
 mod imu;
+mod isolation;
 mod noise;
 mod permutations;
 mod report;
@@ -29,6 +30,7 @@ pub use self::clock_alignment::{
 pub use self::noise::{
     AllanPoint, AllanReport, AxisNoise, GivenNoise, NoiseTerm, NoiseTerms, SensorNoise, measure_noise,
 };
+pub use self::report::agreement::{Agreement, PairAgreement, Quantity};
 pub(crate) use self::report::verdict::MOST_LIKELY;
 pub use self::report::verdict::{Trust, Verdict, joint_statement, problems};
 pub use self::report::{

@@ -12,14 +12,12 @@ use crate::log_check::clock_alignment::{
     ClockAlignment, OFFSET_TOLERANCE_S, ORIENTATION_TOLERANCE_RAD, RotationReference, SCALE_SIGMA, SCALE_TOLERANCE,
     align_clocks,
 };
-use crate::log_check::imu::ImuFacts;
 use crate::log_check::report::{Area, Findings, ImageRotation, Measurement, Severity};
 use crate::log_check::rotations::data::{JOINED_S, RotationData, joined};
 use crate::log_check::rotations::fit::{FREE_ORIENTATION_RAD, FitPriors, RotationFit, RotationPair};
 use crate::log_check::rotations::hypotheses::{self, Outcome, WithinNoise};
 use crate::log_check::statistics::{SIGNIFICANT_SIGMAS, median};
-use crate::log_check::survey::Survey;
-use crate::sensors::{CameraMount, CameraRig, Rig};
+use crate::sensors::{CameraMount, CameraRig};
 
 /// Minimum number of image rotations.
 const MIN_ROTATIONS: usize = 20;
@@ -59,18 +57,9 @@ pub(super) enum HandEyeOutcome {
     Other,
 }
 
-/// Checks orientation and time offset of a camera by its image rotations, if there are any; its rows have the readout
-/// `readout_s`. A misfit beyond the noise is traced to its cause.
-pub(super) fn check_against_gyroscope(
-    survey: &Survey,
-    rig: &Rig,
-    camera: &CameraRig,
-    imu_facts: &ImuFacts,
-    rotations: &[ImageRotation],
-    readout_s: f64,
-    findings: &mut Findings,
-) -> HandEyeOutcome {
-    let data = RotationData::new(survey, rig, imu_facts, camera, rotations, readout_s);
+/// Checks orientation and time offset of a camera by its image rotations, if there are any. A misfit beyond the noise is traced to its cause.
+pub(super) fn check_against_gyroscope(data: RotationData<'_>, findings: &mut Findings) -> HandEyeOutcome {
+    let RotationData { rig, camera, .. } = data;
     let chain = rig.chain_of_camera(&camera.key).filter(|_| data.measured.len() >= MIN_ROTATIONS);
     let Some(chain) = chain else { return HandEyeOutcome::Other };
     let faulty = if !findings.can_compare(Measurement::Gyroscope) {

@@ -4,11 +4,14 @@ mod hand_eye;
 #[cfg(test)]
 mod tests;
 
+use std::collections::BTreeMap;
+
 use nalgebra::{UnitQuaternion, Vector3};
 
 use self::hand_eye::HandEyeOutcome;
 use super::imu::ImuFacts;
 use super::report::{Area, Findings, ImageRotation, Measurement, Severity};
+use super::rotations::data::{MeasuredRotation, RotationData};
 use super::rotations::readout::check_readout;
 use super::survey::Survey;
 use crate::geometry::{RigidTransform, seconds_from_ns};
@@ -23,30 +26,40 @@ const UPRIGHT_ROLL_DEG: f64 = 45.0;
 /// Largest roll by the inverse matrix, in degrees, with which it counts as the right one.
 const INVERSE_ROLL_DEG: f64 = 30.0;
 
-/// Checks the extrinsics of all cameras; returns the rotations of the IMU, in its frame, that would explain the
-/// orientations of rigid cameras that differ from the rig.
+/// Rotations of cameras for later checks.
+#[derive(Debug, Default)]
+pub(super) struct CameraRotations {
+    /// Rotations of the IMU, in its frame, that would explain the orientations of rigid cameras that differ from the rig.
+    pub(super) of_imu: Vec<UnitQuaternion<f64>>,
+    /// Rotations between the first rows of consecutive images, by camera key.
+    pub(super) measured: BTreeMap<String, Vec<MeasuredRotation>>,
+}
+
+/// Checks the extrinsics of all cameras.
 pub(super) fn check_rotations(
     survey: &Survey,
     rig: &Rig,
     imu_facts: &ImuFacts,
     rotations: &[ImageRotation],
     findings: &mut Findings,
-) -> Vec<UnitQuaternion<f64>> {
-    let mut of_imu = Vec::new();
+) -> CameraRotations {
+    let mut found = CameraRotations::default();
     for camera in &rig.cameras {
         check_against_gravity(survey, rig, camera, imu_facts, findings);
         check_lever(camera, findings);
         let mut of_readout = Findings::default();
         let readout_s = check_readout(rig, camera, imu_facts, rotations, &mut of_readout);
-        match hand_eye::check_against_gyroscope(survey, rig, camera, imu_facts, rotations, readout_s, findings) {
+        let data = RotationData::new(survey, rig, imu_facts, camera, rotations, readout_s);
+        found.measured.insert(camera.key.clone(), data.measured.clone());
+        match hand_eye::check_against_gyroscope(data, findings) {
             // By a wrong lens, features move faster in one half of the image, as by a rolling shutter.
             HandEyeOutcome::WrongIntrinsics => continue,
-            HandEyeOutcome::OtherOrientation(rotation) => of_imu.push(rotation),
+            HandEyeOutcome::OtherOrientation(rotation) => found.of_imu.push(rotation),
             HandEyeOutcome::Other => {}
         }
         findings.list.append(&mut of_readout.list);
     }
-    of_imu
+    found
 }
 
 /// `imu_from_camera` at a time, with the measured joint angles for a gimbal camera.

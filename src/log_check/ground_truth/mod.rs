@@ -5,6 +5,7 @@ mod placed_forces;
 
 use nalgebra::{UnitQuaternion, Vector3};
 
+pub(super) use self::placed_forces::{HALF_VELOCITY_NS, around};
 use self::placed_forces::{PlacedForces, velocity_at};
 use super::clock_alignment::{
     AlignmentError, ClockAlignment, ORIENTATION_TOLERANCE_RAD, RotationReference, SCALE_TOLERANCE, align_clocks,
@@ -40,6 +41,10 @@ const SIGNIFICANT_SIGMAS: f64 = 4.0;
 const TILT_TOLERANCE_RAD: f64 = 0.087;
 /// A larger angle means other axes, not an inaccurate levelling.
 const OTHER_AXES_RAD: f64 = 1.0;
+/// Name of the ground truth as the subject of a misfit.
+const MISFIT_NAME: &str = "ground truth";
+/// Largest mean acceleration over a log by the positions of its ground truth, in m/s²: larger ones are no motion.
+const LARGEST_MEAN_ACCELERATION_M_PER_S2: f64 = 20.0;
 /// Shortest time over which a mean specific force is compared with the vertical, in seconds.
 const MIN_DURATION_S: f64 = 1.0;
 
@@ -47,28 +52,33 @@ const MIN_DURATION_S: f64 = 1.0;
 struct GroundTruth<'a> {
     topic: &'a str,
     /// Nanoseconds since the log began, and `world_from_body`.
-    poses: Vec<(i64, RigidTransform)>,
+    poses: &'a [(i64, RigidTransform)],
+}
+
+/// Poses of the ground truth of a rig: nanoseconds since the log began and `world_from_body`, ordered by stamp. Empty without
+/// attitudes; a topic that is missing or unreadable is reported by other checks.
+pub(super) fn poses_of(log: &FlightLog, rig: &Rig) -> Vec<(i64, RigidTransform)> {
+    let topic = rig.ground_truth_topic.as_deref().filter(|topic| !log.is_position_topic(topic));
+    let recorded = topic.and_then(|topic| log.read_trajectory_topic(topic).ok()).unwrap_or_default();
+    let pose = |pose: RecordedPose| {
+        Some((relative_ns(pose.stamp_ns, log.epoch_ns()), RigidTransform::new(pose.rotation?, pose.position_m)))
+    };
+    recorded.into_iter().filter_map(pose).collect()
 }
 
 /// Compares the ground truth of the rig with the IMU, if the log has one with attitudes. `rotations_of_imu` are rotations of
 /// the IMU, in its frame, that would explain the orientations of the cameras.
 pub(super) fn check_ground_truth(
-    log: &FlightLog,
+    poses: &[(i64, RigidTransform)],
     rig: &Rig,
     imu_facts: &ImuFacts,
     rotations_of_imu: &[UnitQuaternion<f64>],
     findings: &mut Findings,
 ) {
-    if !findings.can_compare(Measurement::Gyroscope) {
+    let Some(topic) = rig.ground_truth_topic.as_deref().filter(|_| findings.can_compare(Measurement::Gyroscope)) else {
         return;
-    }
-    let Some(topic) = rig.ground_truth_topic.as_deref().filter(|topic| !log.is_position_topic(topic)) else { return };
-    // A topic that is missing or unreadable is reported by other checks.
-    let Ok(recorded) = log.read_trajectory_topic(topic) else { return };
-    let pose = |pose: RecordedPose| {
-        Some((relative_ns(pose.stamp_ns, log.epoch_ns()), RigidTransform::new(pose.rotation?, pose.position_m)))
     };
-    let truth = GroundTruth { topic, poses: recorded.into_iter().filter_map(pose).collect() };
+    let truth = GroundTruth { topic, poses };
     if imu_facts.samples.is_empty() || truth.poses.is_empty() {
         return;
     }
@@ -105,7 +115,7 @@ impl GroundTruth<'_> {
             Ok(found) => {
                 self.report_clock(&found, imu_delay_s, findings);
                 report_body(&found, rotations_of_imu, findings);
-                let placed = PlacedForces { poses: &self.poses, clock: &found, samples: &imu_facts.samples };
+                let placed = PlacedForces { poses: self.poses, clock: &found, samples: &imu_facts.samples };
                 if findings.can_compare(Measurement::Accelerometer) && !placed.report_axes(findings) {
                     self.report_world(&found, imu_facts, findings);
                 }
@@ -117,7 +127,7 @@ impl GroundTruth<'_> {
     /// Rotations of the body between poses about [`STEP_NS`] apart.
     fn rotations(&self) -> Vec<ImageRotation> {
         let mut chosen: Vec<&(i64, RigidTransform)> = Vec::new();
-        for pose in &self.poses {
+        for pose in self.poses {
             if chosen.last().is_none_or(|last| pose.0 - last.0 >= STEP_NS) {
                 chosen.push(pose);
             }
@@ -183,6 +193,12 @@ impl GroundTruth<'_> {
             tilt_rad.to_degrees(),
             acceleration.norm()
         );
+        if acceleration.norm() > LARGEST_MEAN_ACCELERATION_M_PER_S2 {
+            let title = "the positions of the ground truth have accelerations that no vehicle keeps up";
+            let remedy = "check their unit (metres) and that they have no jumps";
+            findings.add(Severity::Warning, Area::Log, title, evidence, remedy);
+            return findings.mark_misfit(MISFIT_NAME);
+        }
         let tolerance_rad = TILT_TOLERANCE_RAD.max(LARGEST_BIAS_M_PER_S2 / vertical.norm().max(1.0));
         if tilt_rad < tolerance_rad {
             return findings.good(Area::Log, "the world of the ground truth has z up", evidence);
@@ -220,7 +236,7 @@ impl GroundTruth<'_> {
             sum + (pair[0].1 + pair[1].1) * (0.5 * seconds_from_ns(pair[1].0 - pair[0].0))
         });
         let duration_s = seconds_from_ns(last - first);
-        let change = velocity_at(&self.poses, last)? - velocity_at(&self.poses, first)?;
+        let change = velocity_at(self.poses, last)? - velocity_at(self.poses, first)?;
         (duration_s > MIN_DURATION_S).then(|| (integral / duration_s, change / duration_s))
     }
 }
@@ -246,7 +262,8 @@ fn report_failure(error: &AlignmentError, findings: &mut Findings) {
             let title = "unexplained: the rotations of the ground truth are not those of the gyroscope";
             let remedy = "check that it is the trajectory of this vehicle and flight, that its quaternions are \
                           world_from_body, and its stamps; its errors mean nothing until then";
-            return findings.add(Severity::Warning, Area::Log, title, error.to_string(), remedy);
+            findings.add(Severity::Warning, Area::Log, title, error.to_string(), remedy);
+            return findings.mark_misfit(MISFIT_NAME);
         }
         _ => "the ground truth cannot be compared with the gyroscope",
     };
@@ -332,7 +349,7 @@ mod tests {
     fn titles(change: impl Fn(&mut (i64, RigidTransform))) -> Vec<String> {
         let (imu_facts, mut poses) = flight();
         poses.iter_mut().for_each(change);
-        let truth = GroundTruth { topic: "/truth", poses };
+        let truth = GroundTruth { topic: "/truth", poses: &poses };
         let mut findings = Findings::default();
         truth.compare(&imu_facts, 0.0, &[], &mut findings);
         findings.list.into_iter().filter(|it| it.severity != Severity::Good).map(|it| it.title).collect()
@@ -376,7 +393,7 @@ mod tests {
             imu_facts.samples.iter().map(|it| (seconds_from_ns(it.stamp_ns), swapped(it.angular_velocity_rad_per_s)));
         imu_facts.gyroscope = AngularRates::new(rates.collect::<Vec<_>>());
         let mut findings = Findings::default();
-        GroundTruth { topic: "/truth", poses }.compare(&imu_facts, 0.0, &[], &mut findings);
+        GroundTruth { topic: "/truth", poses: &poses }.compare(&imu_facts, 0.0, &[], &mut findings);
         let titles: Vec<&str> = findings.list.iter().map(|finding| finding.title.as_str()).collect();
         assert_eq!(titles, ["the axes of the gyroscope form a left-handed frame, by the ground truth"]);
     }
@@ -401,7 +418,7 @@ mod tests {
             sample.specific_force_m_per_s2 = change(force);
         }
         let mut findings = Findings::default();
-        GroundTruth { topic: "/truth", poses }.compare(&imu_facts, 0.0, &[], &mut findings);
+        GroundTruth { topic: "/truth", poses: &poses }.compare(&imu_facts, 0.0, &[], &mut findings);
         findings.list.into_iter().filter(|it| it.severity != Severity::Good).map(|it| it.title).collect()
     }
 
@@ -427,7 +444,7 @@ mod tests {
         }
         let titles = |turns: &[UnitQuaternion<f64>]| {
             let mut findings = Findings::default();
-            GroundTruth { topic: "/truth", poses: poses.clone() }.compare(&imu_facts, 0.0, turns, &mut findings);
+            GroundTruth { topic: "/truth", poses: &poses }.compare(&imu_facts, 0.0, turns, &mut findings);
             findings.list.iter().map(|it| it.title.clone()).collect::<Vec<_>>().join("; ")
         };
         let by_both = titles(&[turn.inverse()]);

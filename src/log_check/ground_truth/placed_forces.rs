@@ -10,7 +10,7 @@ use crate::log_check::report::{Area, Findings, Measurement, Severity};
 use crate::sensors::ImuSample;
 
 /// Half the time over which a velocity is measured, in nanoseconds.
-const HALF_VELOCITY_NS: i64 = 100_000_000;
+pub(crate) const HALF_VELOCITY_NS: i64 = 100_000_000;
 /// Minimum number of windows.
 const MIN_WINDOWS: usize = 20;
 /// Largest variance that the best axes leave, as a ratio of the variance of the accelerations.
@@ -117,10 +117,15 @@ impl PlacedForces<'_> {
 
 /// Mean velocity over [`HALF_VELOCITY_NS`] to both sides of a stamp, in m/s; `None` without poses there.
 pub(super) fn velocity_at(poses: &[(i64, RigidTransform)], stamp_ns: i64) -> Option<Vector3<f64>> {
-    let start = poses.partition_point(|(at, _)| *at < stamp_ns - HALF_VELOCITY_NS);
-    let end = poses.partition_point(|(at, _)| *at <= stamp_ns + HALF_VELOCITY_NS);
-    let around = poses.get(start..end)?;
-    let (first, last) = (around.first()?, around.last()?);
+    let [first, last] = around(poses, stamp_ns)?;
     let interval_s = seconds_from_ns(last.0 - first.0);
     (interval_s > 0.0).then(|| (last.1.translation_m - first.1.translation_m) / interval_s)
+}
+
+/// First and last pose within [`HALF_VELOCITY_NS`] to both sides of a stamp.
+pub(crate) fn around(poses: &[(i64, RigidTransform)], stamp_ns: i64) -> Option<[&(i64, RigidTransform); 2]> {
+    let start = poses.partition_point(|(at, _)| *at < stamp_ns - HALF_VELOCITY_NS);
+    let end = poses.partition_point(|(at, _)| *at <= stamp_ns + HALF_VELOCITY_NS);
+    let within = poses.get(start..end)?;
+    Some([within.first()?, within.last()?])
 }

@@ -1,29 +1,24 @@
 //! Findings of a check and the report that holds them.
 
+pub(super) mod agreement;
+mod interval;
 mod render;
 pub(super) mod verdict;
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::UnitQuaternion;
 use serde::ser::SerializeStruct as _;
 use serde::{Deserialize, Serialize, Serializer};
 
+use self::agreement::Agreement;
+pub use self::interval::FindingInterval;
 use crate::faults::Fault;
 pub use crate::faults::{Area, Severity};
 use crate::frontend::readout::RowTrack;
 use crate::geometry::seconds_from_ns;
 use crate::sensors::ImageMask;
 use crate::text::without_signed_zeros;
-
-/// Time in which a finding holds, in seconds since the log began.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct FindingInterval {
-    /// `None` from the start of the log on.
-    pub since_s: Option<f64>,
-    /// `None` up to the end of the log.
-    pub until_s: Option<f64>,
-}
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Finding {
@@ -98,6 +93,9 @@ pub struct CheckReport {
     pub topics: Vec<TopicReport>,
     /// Most severe first, then by area.
     pub findings: Vec<Finding>,
+    /// Sources that measure one quantity, compared with each other.
+    #[serde(default)]
+    pub agreement: Agreement,
     /// Masks for cameras with the vehicle in view; not part of the JSON.
     #[serde(skip)]
     pub proposed_masks: Vec<ProposedMask>,
@@ -113,7 +111,7 @@ pub struct ProposedMask {
 
 impl Serialize for CheckReport {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut fields = serializer.serialize_struct("CheckReport", 7)?;
+        let mut fields = serializer.serialize_struct("CheckReport", 8)?;
         fields.serialize_field("verdict", &self.verdict())?;
         fields.serialize_field("log", &self.log)?;
         fields.serialize_field("rig", &self.rig)?;
@@ -121,6 +119,7 @@ impl Serialize for CheckReport {
         fields.serialize_field("duration_s", &self.duration_s)?;
         fields.serialize_field("topics", &self.topics)?;
         fields.serialize_field("findings", &self.findings)?;
+        fields.serialize_field("agreement", &self.agreement)?;
         fields.end()
     }
 }
@@ -147,6 +146,9 @@ pub(super) struct Findings {
     pub(super) list: Vec<Finding>,
     /// Measurements with a fault that is reported: comparisons with them would report its consequences as causes.
     faulty: BTreeSet<Measurement>,
+    /// Places of the findings about a misfit, each with its camera or topic: causes with their faults, and without faults
+    /// unexplained ones.
+    misfits: BTreeMap<usize, String>,
 }
 
 impl Findings {
@@ -192,6 +194,40 @@ impl Findings {
             last.faults.extend(faults);
             last.interval.since_s = last.interval.since_s.or_else(|| last.since_s());
         }
+    }
+
+    /// Marks the finding that was added last as one about a misfit of a camera or a topic, whose cause other sources may
+    /// exclude.
+    pub(super) fn mark_misfit(&mut self, of: &str) {
+        self.misfits.extend(self.list.len().checked_sub(1).map(|place| (place, of.to_owned())));
+    }
+
+    /// True if a misfit of a camera or a topic is reported without a cause.
+    pub(super) fn is_unexplained(&self, of: &str) -> bool {
+        self.misfits.iter().any(|(place, subject)| subject == of && self.list[*place].faults.is_empty())
+    }
+
+    /// Findings but for misfits without a cause.
+    pub(super) fn explained(&self) -> impl Iterator<Item = &Finding> {
+        let findings = self.list.iter().enumerate();
+        let explained = |(place, it): &(usize, &Finding)| !it.faults.is_empty() || !self.misfits.contains_key(place);
+        findings.filter(explained).map(|(_, finding)| finding)
+    }
+
+    /// Removes and returns the findings about a misfit that are excluded.
+    pub(super) fn retract_misfits(&mut self, is_excluded: impl Fn(&Finding) -> bool) -> Vec<Finding> {
+        let (mut kept, mut removed, mut misfits) = (Vec::new(), Vec::new(), BTreeMap::new());
+        for (place, finding) in std::mem::take(&mut self.list).into_iter().enumerate() {
+            let subject = self.misfits.remove(&place);
+            if subject.is_some() && is_excluded(&finding) {
+                removed.push(finding);
+            } else {
+                misfits.extend(subject.map(|subject| (kept.len(), subject)));
+                kept.push(finding);
+            }
+        }
+        (self.list, self.misfits) = (kept, misfits);
+        removed
     }
 
     /// Adds a warning about a value that is only assumed.

@@ -7,6 +7,7 @@ mod imu_samples;
 pub(super) mod topic_survey;
 
 use std::collections::BTreeMap;
+use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
@@ -202,6 +203,20 @@ impl Survey {
             angle_fit::fit(&readings, self.encoder_variances_rad2[joint])
         };
         (0..around.len()).map(angle).collect()
+    }
+
+    /// Variance of the white noise of each joint's readings, or of their rounding if it is larger, as a ratio of the variance
+    /// with which [`Self::fitted_angles_at`] fits them: angles that are computed from attitudes have less noise than the rig
+    /// says.
+    pub(crate) fn joint_noise_ratios(&self) -> Vec<f64> {
+        let ratio = |(joint, variance_rad2): (usize, &f64)| {
+            let angles: Vec<f64> = self.joint_samples.iter().map(|sample| sample.angles_rad[joint]).collect();
+            let steps = angles.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|step| *step > 0.0);
+            let smallest_rad = steps.fold(TAU, f64::min);
+            let measured_rad2 = white_sigma(&angles, self.wraps[joint]).powi(2).max(smallest_rad.powi(2) / 12.0);
+            (measured_rad2 / variance_rad2).min(1.0)
+        };
+        self.encoder_variances_rad2.iter().enumerate().map(ratio).collect()
     }
 
     /// Sets the joint angles of all joints from encoders or attitudes, in IMU time.

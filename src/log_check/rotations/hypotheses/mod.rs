@@ -226,10 +226,12 @@ impl<'a> Comparison<'a> {
 }
 
 impl NamedCause {
-    fn report(&self, title: &str, evidence: String, findings: &mut Findings) {
+    /// Adds the finding of the camera `key`.
+    fn report(&self, key: &str, title: &str, evidence: String, findings: &mut Findings) {
         let Sentence { severity, remedy, .. } = &self.sentence;
         findings.add(*severity, self.area, title, evidence, remedy.clone());
         findings.state_faults(self.fault.clone());
+        findings.mark_misfit(key);
     }
 }
 
@@ -247,17 +249,18 @@ impl Outcome {
         match self {
             Self::Decisive(cause, of_cause) => {
                 let evidence = format!("{of_cause}; as recorded: {evidence}");
-                cause.report(&cause.sentence.statement, evidence, findings);
+                cause.report(key, &cause.sentence.statement, evidence, findings);
             }
             Self::Open(causes) => {
                 let title =
                     format!("unexplained: the rotations of {key} differ from the prediction by more than their noise");
                 if causes.is_empty() {
-                    return findings.add(Severity::Warning, Area::Extrinsics, title, evidence, remedy);
+                    findings.add(Severity::Warning, Area::Extrinsics, title, evidence, remedy);
+                    return findings.mark_misfit(key);
                 }
                 if let [(only, of_cause)] = causes.as_slice() {
                     let title = format!("most likely {}", only.sentence.statement);
-                    return only.report(&title, format!("{of_cause}; as recorded: {evidence}"), findings);
+                    return only.report(key, &title, format!("{of_cause}; as recorded: {evidence}"), findings);
                 }
                 let listed: Vec<String> = causes
                     .iter()
@@ -269,6 +272,7 @@ impl Outcome {
                 let evidence = format!("{}; as recorded: {evidence}", listed.join("; or "));
                 findings.add(Severity::Warning, Area::Extrinsics, title, evidence, remedies.join("; or "));
                 findings.state_faults(causes.iter().filter_map(|(cause, _)| cause.fault.clone()));
+                findings.mark_misfit(key);
             }
         }
     }

@@ -1,0 +1,218 @@
+//! Sentences about sources that disagree.
+
+use std::f64::consts::TAU;
+
+use nalgebra::Vector3;
+
+use super::comparison::{Change, Parameter};
+use super::pair::Pair;
+use super::source::Source;
+use crate::faults::{Area, Severity};
+use crate::geometry::so3;
+use crate::log_check::report::FindingInterval;
+
+/// Largest error with which the factor on a missing term is one.
+const MISSING_TOLERANCE: f64 = 0.1;
+/// Largest ratio of a factor on positions to a unit with which it is this unit: accelerations in a small unit measure the
+/// factor coarsely, and other units are far.
+const UNIT_RATIO: f64 = 2.0;
+
+/// Finding about sources that disagree.
+pub(super) struct Statement {
+    pub(super) severity: Severity,
+    pub(super) area: Area,
+    pub(super) title: String,
+    pub(super) evidence: String,
+    pub(super) remedy: String,
+    pub(super) interval: FindingInterval,
+    /// Sources of which at least one is wrong.
+    pub(super) suspected: Vec<Source>,
+    /// True if exactly these are wrong.
+    pub(super) is_isolated: bool,
+    /// True if the sentence names the cause.
+    pub(super) is_cause: bool,
+    /// True if it names the change of one source at a time with its value.
+    pub(super) is_measured_change: bool,
+}
+
+impl Statement {
+    /// Sentence for the smallest sets of sources that explain the pairs; `None` without a set.
+    pub(super) fn of(alternatives: &[Vec<Source>], pairs: &[Pair]) -> Option<Self> {
+        let suspected: Vec<Source> = {
+            let mut all: Vec<Source> = alternatives.iter().flatten().cloned().collect();
+            all.sort();
+            all.dedup();
+            all
+        };
+        let first = suspected.first()?;
+        let involved =
+            |pair: &&Pair| pair.fit.disagrees.is_some() && pair.sources.iter().any(|it| suspected.contains(it));
+        // The most precise pair gives time and value.
+        let sharpest = pairs.iter().filter(involved).min_by(|a, b| a.fit.noise.total_cmp(&b.fit.noise))?;
+        let interval = sharpest.fit.disagrees.unwrap_or_default();
+        let times = times(interval);
+        let is_isolated = alternatives.len() == 1;
+        let change = sharpest.fit.change.as_ref();
+        let mut statement = Self {
+            severity: Severity::Warning,
+            area: first.area(),
+            title: String::new(),
+            evidence: evidence(pairs),
+            remedy: suspected.iter().map(Source::remedy).collect::<Vec<_>>().join("; or "),
+            interval,
+            is_isolated,
+            is_cause: false,
+            is_measured_change: false,
+            suspected: suspected.clone(),
+        };
+        if let Some((severity, title, remedy)) = change.and_then(named_cause) {
+            (statement.severity, statement.title, statement.remedy) = (severity, title, remedy.to_owned());
+            statement.is_cause = true;
+            return Some(statement);
+        }
+        let detail = match (change, alternatives) {
+            (Some(change), [only]) if only.len() == 1 => {
+                let is_first = sharpest.sources[0] == only[0];
+                detail(change, sharpest, is_first).map_or_else(String::new, |text| format!(": {text}"))
+            }
+            _ => String::new(),
+        };
+        statement.is_measured_change = !detail.is_empty() && interval.since_s.is_some();
+        let names: Vec<String> = suspected.iter().map(Source::name).collect();
+        statement.title = match alternatives {
+            [only] => {
+                let verb = if only.len() == 1 { first.disagrees() } else { "disagree" };
+                let others = others(&suspected, pairs);
+                format!("{} {verb} with {}{times}{detail}", all_of(&names, "and"), all_of(&others, "and"))
+            }
+            [_, _] if names.len() == alternatives.len() => {
+                format!("{} or {} is wrong: they disagree{times}", names[0], names[1])
+            }
+            _ => format!("{} disagree with each other{times}", all_of(&names, "and")),
+        };
+        Some(statement)
+    }
+
+    /// Sentence about two cameras whose images are exchanged.
+    pub(super) fn of_exchange(cameras: [&str; 2], misfits: [[f64; 2]; 2], suspected: Vec<Source>) -> Self {
+        let [first, second] = cameras;
+        let of = |key: &str, [given, exchanged]: [f64; 2]| {
+            format!(
+                "the misfit of {key} is {given:.1} times the noise, {exchanged:.1} times with the images of the other"
+            )
+        };
+        Self {
+            severity: Severity::Error,
+            area: Area::Images,
+            title: format!("the images of {first} and {second} are exchanged"),
+            evidence: format!("{}; {}", of(first, misfits[0]), of(second, misfits[1])),
+            remedy: format!("exchange rostopic of {first} and {second} in the rig, or the topics in the driver"),
+            interval: FindingInterval::default(),
+            suspected,
+            is_isolated: true,
+            is_cause: true,
+            is_measured_change: false,
+        }
+    }
+}
+
+/// Cause that a parameter alone is, with its remedy.
+fn named_cause(change: &Change) -> Option<(Severity, String, &'static str)> {
+    let value = *change.values.first()?;
+    match change.parameter {
+        Parameter::Transport if (value - 1.0).abs() < MISSING_TOLERANCE => Some((
+            Severity::Error,
+            "the accelerometer lacks ω × v: its specific forces are derivatives of the velocity in the body's axes"
+                .to_owned(),
+            "add the cross product of angular rate and velocity where the forces are made: an accelerometer measures the \
+             acceleration in the world, in its axes",
+        )),
+        Parameter::PositionScale => {
+            let factor = 1.0 / (1.0 + value);
+            let units = [(1000.0, "millimetres"), (100.0, "centimetres")];
+            let unit = units.iter().find(|(size, _)| (1.0 / UNIT_RATIO..UNIT_RATIO).contains(&(factor / size)))?.1;
+            Some((
+                Severity::Warning,
+                format!("positions of the ground truth are in {unit}"),
+                "convert its positions to metres, as nav_msgs and geometry_msgs require",
+            ))
+        }
+        _ => None,
+    }
+}
+
+/// Difference of the only suspected source, the first or the second one of a pair, from the other one.
+fn detail(change: &Change, pair: &Pair, is_first: bool) -> Option<String> {
+    let sign = if is_first { 1.0 } else { -1.0 };
+    let vector = || {
+        let of_first = Vector3::from_iterator(change.values.iter().copied());
+        let axes = pair.first_from_second;
+        if is_first { of_first } else { -(axes.inverse() * of_first) }
+    };
+    let is_constant = pair.fit.disagrees.is_none_or(|interval| interval == FindingInterval::default());
+    let value = sign * change.values.first()?;
+    Some(match change.parameter {
+        Parameter::Rate => {
+            let rate = vector();
+            format!("its angular rates shift by ({:+.3}, {:+.3}, {:+.3}) rad/s", rate.x, rate.y, rate.z)
+        }
+        Parameter::Orientation => {
+            let degrees = so3::exp(&vector()).angle().min(TAU).to_degrees();
+            format!("rotated by {degrees:.1}°")
+        }
+        Parameter::Delay => {
+            let side = if value > 0.0 { "earlier" } else { "later" };
+            let then = if is_constant { "" } else { "then " };
+            format!("stamps are {then}{:.0} ms {side}", 1e3 * value.abs())
+        }
+        Parameter::Scale => format!("its rotations are {:.3} times theirs", 1.0 + value),
+        Parameter::ForceBias => {
+            let bias = vector();
+            format!("its specific forces shift by ({:+.2}, {:+.2}, {:+.2}) m/s²", bias.x, bias.y, bias.z)
+        }
+        Parameter::Gravity | Parameter::Lever | Parameter::PositionScale | Parameter::Transport => return None,
+    })
+}
+
+/// Sources that disagree with the suspected ones.
+fn others(suspected: &[Source], pairs: &[Pair]) -> Vec<String> {
+    let mut others: Vec<&Source> = pairs
+        .iter()
+        .filter(|pair| pair.fit.disagrees.is_some())
+        .flat_map(|pair| &pair.sources)
+        .filter(|source| !suspected.contains(source))
+        .collect();
+    others.sort();
+    others.dedup();
+    others.into_iter().map(Source::name).collect()
+}
+
+fn evidence(pairs: &[Pair]) -> String {
+    let of_pair = |pair: &Pair| {
+        let [one, other] = pair.sources.each_ref().map(Source::name);
+        let misfit = pair.fit.misfit;
+        match pair.fit.disagrees {
+            None => format!("{one} and {other} agree ({misfit:.1} times the noise)"),
+            Some(interval) => format!("{one} and {other} disagree{} ({misfit:.1} times the noise)", times(interval)),
+        }
+    };
+    pairs.iter().map(of_pair).collect::<Vec<_>>().join("; ")
+}
+
+fn times(interval: FindingInterval) -> String {
+    match (interval.since_s, interval.until_s) {
+        (Some(since_s), Some(until_s)) => format!(" from {since_s:.1} to {until_s:.1} s"),
+        (Some(since_s), None) => format!(" from {since_s:.1} s on"),
+        (None, Some(until_s)) => format!(" up to {until_s:.1} s"),
+        (None, None) => String::new(),
+    }
+}
+
+/// Names as a list with a conjunction before the last one.
+fn all_of(names: &[String], conjunction: &str) -> String {
+    match names {
+        [] => String::new(),
+        [only] => only.clone(),
+        [first @ .., last] => format!("{} {conjunction} {last}", first.join(", ")),
+    }
+}
