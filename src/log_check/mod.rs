@@ -8,6 +8,7 @@ mod clock_alignment;
 mod extrinsics;
 mod gimbal;
 mod ground_truth;
+mod held;
 mod images;
 mod imu;
 mod isolation;

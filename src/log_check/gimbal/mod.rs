@@ -8,6 +8,7 @@ pub(super) mod vehicle_attitude;
 use std::f64::consts::{PI, TAU};
 
 use self::frozen_joints::AT_LIMIT_RAD;
+use super::held::Held;
 use super::report::{Area, Findings, Measurement, Severity};
 use super::statistics::{median, percentile, white_sigma};
 use super::survey::{Survey, is_in_radians};
@@ -59,12 +60,41 @@ pub(super) fn check_joints(survey: &Survey, rig: &Rig, findings: &mut Findings) 
     if survey.joints.is_empty() {
         return;
     }
+    let is_held = check_held(survey, gimbal, findings);
     let readings: Vec<Vec<(i64, f64)>> =
         (0..gimbal.joints.len()).map(|number| finite_readings(survey, number)).collect();
     check_unit(gimbal, &readings, findings);
     for (number, (joint, readings)) in gimbal.joints.iter().zip(readings).enumerate() {
-        check_joint(survey, gimbal, number, joint, readings, findings);
+        let white = check_joint(survey, gimbal, number, joint, readings, findings);
+        if let Some(white) = white.filter(|_| !is_held) {
+            compare_sigma(&joint.name, white, gimbal.encoder_sigma_rad.unwrap_or(0.0), findings);
+        }
     }
+}
+
+/// Reports joint angles or attitudes that are held; true if they are.
+fn check_held(survey: &Survey, gimbal: &GimbalRig, findings: &mut Findings) -> bool {
+    let held = if gimbal.attitude.is_some() {
+        let topic = gimbal.topic.as_ref().and_then(|topic| survey.topics.get(topic));
+        topic.and_then(|topic| Held::of(&topic.contents()))
+    } else {
+        let complete = survey.joints.iter().filter(|reading| reading.angles_rad.iter().all(Option::is_some));
+        let mut readings: Vec<(i64, &[Option<f64>])> =
+            complete.map(|reading| (reading.stamp_ns, reading.angles_rad.as_slice())).collect();
+        readings.sort_by_key(|(stamp_ns, _)| *stamp_ns);
+        Held::of(&readings)
+    };
+    let Some(held) = held else { return false };
+    let (name, verb) = if gimbal.attitude.is_some() {
+        ("the gimbal's attitude", "holds its")
+    } else {
+        ("the joint angles", "hold their")
+    };
+    held.report(Area::Encoders, name, verb, findings);
+    if held.is_late() {
+        findings.exclude(Measurement::Joints);
+    }
+    true
 }
 
 /// Finite readings of a joint with their stamps.
@@ -104,7 +134,7 @@ fn first_revolution_s(readings: &[(i64, f64)]) -> Option<f64> {
     Some(seconds_from_ns(step[1].0))
 }
 
-/// Checks one joint; `angles` are its finite readings.
+/// Checks one joint and returns the standard deviation of its white noise in radians; `angles` are its finite readings.
 fn check_joint(
     survey: &Survey,
     gimbal: &GimbalRig,
@@ -112,7 +142,7 @@ fn check_joint(
     joint: &Joint,
     angles: Vec<(i64, f64)>,
     findings: &mut Findings,
-) {
+) -> Option<f64> {
     let name = &joint.name;
     let readings = || survey.joints.iter().filter_map(|message| message.angles_rad[number]);
     let missing = survey.joints.len() - readings().count();
@@ -144,7 +174,7 @@ fn check_joint(
     }
     let values: Vec<f64> = angles.iter().map(|(_, angle)| *angle).collect();
     if values.len() < 3 || exceeds_radians(&angles) {
-        return;
+        return None;
     }
     let (low, high) = (percentile(&values, 0.0), percentile(&values, 1.0));
     let (lower, upper) = joint.limits_rad;
@@ -197,7 +227,7 @@ fn check_joint(
         let remedy = "the camera is not stabilized there: expect faster image motion";
         findings.add(Severity::Note, Area::Encoders, format!("'{name}' reaches its limit"), evidence, remedy);
     }
-    compare_sigma(name, white, sigma, findings);
+    Some(white)
 }
 
 fn compare_sigma(name: &str, measured: f64, given: f64, findings: &mut Findings) {

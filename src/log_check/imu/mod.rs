@@ -10,6 +10,7 @@ use nalgebra::Vector3;
 use self::spectrum::{Spectrum, check_noise};
 use self::stationary::{Stamped, StationaryTest, WINDOW_NS, Window};
 use self::unmeasured::check_unmeasured;
+use super::held::Held;
 use super::report::{Area, Findings, Measurement, Severity};
 use super::statistics::{median, middle_range};
 use super::survey::Survey;
@@ -42,8 +43,11 @@ const LARGE_BIAS_RAD_PER_S: f64 = 0.03;
 const MIN_SAMPLES: usize = 10;
 /// Minimum number of samples of a window.
 const MIN_WINDOW_SAMPLES: usize = 20;
-/// Minimum number of samples at the largest value that are a saturation.
+/// Minimum numbers of peaks that end at the largest value and of samples there that are a saturation, and the smallest ratio
+/// of these to the samples at the value next to it: coarse values repeat at any height.
+const MIN_PEAKS: usize = 2;
 const MIN_CLIPPED: usize = 3;
+const NEXT_RATIO: usize = 2;
 /// Smallest limits of a saturation, in rad/s and m/s²: smaller largest values are chance.
 const SMALLEST_LIMITS: [f64; 2] = [1.0, 12.0];
 /// Largest angular rate in rad/s: 2000 °/s, the widest range of consumer gyroscopes.
@@ -96,6 +100,9 @@ pub(super) fn check_imu(survey: &Survey, rig: Option<&Rig>, findings: &mut Findi
         survey.imu_topics.iter().filter(|topic| survey.imu_topic.as_ref() != Some(*topic)).collect();
     check_gravity(&samples, &stationary, rig, &others, findings);
     let gyroscope_bias = check_gyroscope_bias(&stationary, findings);
+    if !check_held(&rates, &forces, findings) {
+        check_repeated(&samples, findings);
+    }
     check_clipping(&samples, findings);
     check_noise(&spectra, rig, findings);
     check_stationary(&windows, findings);
@@ -249,32 +256,63 @@ fn check_gyroscope_bias(stationary: &[Window], findings: &mut Findings) -> Optio
     Some(bias)
 }
 
-/// Checks saturation (many samples at exactly the largest value) and repeated samples.
+/// Reports held values of gyroscope and accelerometer; true if both are held in common.
+fn check_held(rates: &[Stamped], forces: &[Stamped], findings: &mut Findings) -> bool {
+    let [held_rates, held_forces] = [rates, forces].map(Held::of);
+    let both = held_rates.filter(|_| held_rates == held_forces);
+    if let Some(both) = both {
+        both.report(Area::Imu, "the IMU", "holds its", findings);
+    }
+    let sensors = [
+        ("the gyroscope", Measurement::Gyroscope, held_rates),
+        ("the accelerometer", Measurement::Accelerometer, held_forces),
+    ];
+    for (name, measurement, held) in sensors {
+        let Some(held) = held else { continue };
+        if both.is_none() {
+            held.report(Area::Imu, name, "holds its", findings);
+        }
+        if held.is_late() {
+            findings.exclude(measurement);
+        }
+    }
+    both.is_some()
+}
+
+/// Checks saturation: several peaks of one axis end at exactly the largest value, and few samples have the value next to it.
 fn check_clipping(samples: &[ImuSample], findings: &mut Findings) {
-    let components = |gyroscope: bool, axis: usize| {
-        samples.iter().map(move |sample| {
-            if gyroscope { sample.angular_velocity_rad_per_s[axis] } else { sample.specific_force_m_per_s2[axis] }
-        })
+    let vector = |sample: &ImuSample, gyroscope: bool| {
+        if gyroscope { sample.angular_velocity_rad_per_s } else { sample.specific_force_m_per_s2 }
     };
     let mut largest = [0.0_f64; 2];
     let mut clipped = false;
-    for (name, gyroscope) in [("gyroscope", true), ("accelerometer", false)] {
+    for (sensor, (name, unit)) in [("gyroscope", "rad/s"), ("accelerometer", "m/s²")].into_iter().enumerate() {
+        let of_sensor = |sample: &ImuSample| vector(sample, sensor == 0);
         for axis in 0..3 {
-            let limit = components(gyroscope, axis).map(f64::abs).fold(0.0, f64::max);
-            let hits = components(gyroscope, axis).filter(|value| value.abs() >= limit).count();
-            let sensor = usize::from(!gyroscope);
+            let value = |sample: &ImuSample| of_sensor(sample)[axis].abs();
+            let limit = samples.iter().map(value).fold(0.0, f64::max);
             largest[sensor] = largest[sensor].max(limit);
-            if hits >= MIN_CLIPPED && hits < samples.len() / 2 && limit > SMALLEST_LIMITS[sensor] {
-                clipped = true;
-                let unit = if gyroscope { "rad/s" } else { "m/s²" };
-                let title = format!("the {name} saturates on {}", ["x", "y", "z"][axis]);
-                let evidence = format!("{hits} samples at exactly ±{limit:.4} {unit}");
-                let remedy =
-                    "set a wider range in the sensor, or reduce vibration: clipped samples bias the preintegration";
-                findings.add(Severity::Warning, Area::Imu, title, evidence, remedy);
-                let at_limit = samples.iter().zip(components(gyroscope, axis)).filter(|(_, it)| it.abs() >= limit);
-                findings.state_interval(at_limit.map(|(sample, _)| sample.stamp_ns));
+            // A value that is held is one measurement.
+            let measured: Vec<f64> = samples
+                .chunk_by(|one, other| of_sensor(one) == of_sensor(other))
+                .filter_map(|equal| equal.first().map(value))
+                .collect();
+            let peaks = measured.chunk_by(|one, other| (*one >= limit) == (*other >= limit));
+            let peaks = peaks.filter(|peak| peak.first().is_some_and(|value| *value >= limit)).count();
+            let hits = measured.iter().filter(|value| **value >= limit).count();
+            let next = measured.iter().copied().filter(|value| *value < limit).fold(0.0, f64::max);
+            let near = measured.iter().filter(|value| **value == next).count();
+            let is_limit = peaks >= MIN_PEAKS && hits >= MIN_CLIPPED && hits >= NEXT_RATIO * near;
+            if !is_limit || hits >= samples.len() / 2 || limit <= SMALLEST_LIMITS[sensor] {
+                continue;
             }
+            clipped = true;
+            let title = format!("the {name} saturates on {}", ["x", "y", "z"][axis]);
+            let evidence = format!("{hits} samples of {peaks} peaks at exactly ±{limit:.4} {unit}");
+            let remedy =
+                "set a wider range in the sensor, or reduce vibration: clipped samples bias the preintegration";
+            findings.add(Severity::Warning, Area::Imu, title, evidence, remedy);
+            findings.state_interval(samples.iter().filter(|it| value(it) >= limit).map(|it| it.stamp_ns));
         }
     }
     let evidence = format!("largest values {:.2} rad/s and {:.1} m/s²", largest[0], largest[1]);
@@ -286,6 +324,10 @@ fn check_clipping(samples: &[ImuSample], findings: &mut Findings) {
     } else if !clipped {
         findings.good(Area::Imu, "the IMU does not saturate", evidence);
     }
+}
+
+/// Reports samples that repeat the one before.
+fn check_repeated(samples: &[ImuSample], findings: &mut Findings) {
     let equal = |one: &ImuSample, other: &ImuSample| {
         one.angular_velocity_rad_per_s == other.angular_velocity_rad_per_s
             && one.specific_force_m_per_s2 == other.specific_force_m_per_s2

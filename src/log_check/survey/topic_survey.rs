@@ -52,6 +52,14 @@ impl TopicSurvey {
         self.times.iter().filter(is_new).map(|times| times.stamp_ns).collect()
     }
 
+    /// Stamps with the checksums of the messages, ordered by stamp.
+    pub(crate) fn contents(&self) -> Vec<(i64, u32)> {
+        let content = |times: &Times| Some((times.stamp_ns, times.checksum?));
+        let mut contents: Vec<(i64, u32)> = self.times.iter().filter_map(content).collect();
+        contents.sort_by_key(|(stamp_ns, _)| *stamp_ns);
+        contents
+    }
+
     /// Number of a frame among the frames of the topic; frames beyond the limit share one.
     pub(crate) fn frame(&mut self, name: &str) -> usize {
         let known = self.frames.iter().position(|known| known == name);
