@@ -258,7 +258,7 @@ fn an_accelerometer_on_its_own_topic_is_checked_with_its_own_rate() {
 
 #[test]
 fn imu_faults_are_found() {
-    use Severity::{Error, Note, Warning};
+    use Severity::{Error, Good, Note, Warning};
     let imu = |imu| Flight { imu, ..Flight::default() };
     let rig = |from: &str, to: &str| {
         assert!(rig_text().contains(from));
@@ -274,6 +274,20 @@ fn imu_faults_are_found() {
         true
     };
     expect(&imu(clip), Warning, &["the gyroscope saturates on x", "±1.5000 rad/s"]);
+    // One value that comes again and again at one peak is held, not clipped.
+    let repeated = |ms: i64, _: &mut MessageTimes, rate: &mut Vector3<f64>, _: &mut Vector3<f64>| {
+        if (6000..6060).contains(&ms) {
+            *rate = Vector3::new(3.5, 0.1, 0.2);
+        }
+        true
+    };
+    expect(&imu(repeated), Good, &["the IMU does not saturate"]);
+    let held = |ms: i64, _: &mut MessageTimes, _: &mut Vector3<f64>, force: &mut Vector3<f64>| {
+        let measured_ms = ms - ms % 15;
+        *force = Vector3::new(0.001 * measured_ms as f64, 0.3, 9.81);
+        true
+    };
+    expect(&imu(held), Warning, &["the accelerometer holds its values: 66.7 new ones", "in messages at 200 Hz"]);
     let nan = |ms: i64, _: &mut MessageTimes, rate: &mut Vector3<f64>, _: &mut Vector3<f64>| {
         rate.y = if ms == 5000 { f64::NAN } else { rate.y };
         true

@@ -75,20 +75,22 @@ pub(crate) fn check_content(survey: &Survey, rig: &Rig, findings: &mut Findings)
     faults
 }
 
-/// Rotations of the cameras whose images are not broken.
+/// Rotations of the cameras whose images are not broken and whose stamps are times of exposure.
 pub(crate) fn of_intact_images(
     rotations: &[ImageRotation],
     faults: &BTreeMap<String, ContentFault>,
     findings: &mut Findings,
 ) -> Vec<ImageRotation> {
-    let is_broken = |key: &String| faults.get(key) == Some(&ContentFault::Broken);
     let measured: BTreeSet<&String> = rotations.iter().map(|rotation| &rotation.camera_key).collect();
-    for key in measured.into_iter().filter(|key| is_broken(key)) {
+    let is_broken =
+        |key: &&String| faults.get(*key) == Some(&ContentFault::Broken) || !findings.can_compare_camera(key);
+    let broken: BTreeSet<&String> = measured.into_iter().filter(is_broken).collect();
+    for key in &broken {
         let title = format!("the rotations of {key} are not compared");
-        let evidence = "the fault of its images is reported above";
+        let evidence = "the fault of its images or stamps is reported above";
         findings.add(Severity::Note, Area::Extrinsics, title, evidence, "check again when it is corrected");
     }
-    rotations.iter().filter(|rotation| !is_broken(&rotation.camera_key)).cloned().collect()
+    rotations.iter().filter(|rotation| !broken.contains(&rotation.camera_key)).cloned().collect()
 }
 
 /// Measured images of a camera.

@@ -146,6 +146,8 @@ pub(super) struct Findings {
     pub(super) list: Vec<Finding>,
     /// Measurements with a fault that is reported: comparisons with them would report its consequences as causes.
     faulty: BTreeSet<Measurement>,
+    /// Keys of the cameras with a fault of their stamps that is reported.
+    faulty_cameras: BTreeSet<String>,
     /// Places of the findings about a misfit, each with its camera or topic: causes with their faults, and without faults
     /// unexplained ones.
     misfits: BTreeMap<usize, String>,
@@ -238,6 +240,16 @@ impl Findings {
     /// Excludes a measurement, whose fault is reported, from later comparisons.
     pub(super) fn exclude(&mut self, measurement: Measurement) {
         self.faulty.insert(measurement);
+    }
+
+    /// Excludes the images of a camera, whose stamps are reported to be wrong, from later comparisons.
+    pub(super) fn exclude_camera(&mut self, key: &str) {
+        self.faulty_cameras.insert(key.to_owned());
+    }
+
+    /// True unless a fault of the camera's stamps is reported.
+    pub(super) fn can_compare_camera(&self, key: &str) -> bool {
+        !self.faulty_cameras.contains(key)
     }
 
     /// True unless a fault of the measurement is reported.

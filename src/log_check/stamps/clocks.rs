@@ -11,6 +11,14 @@ use crate::log_check::survey::topic_survey::{Times, TopicSurvey};
 const CLOCK_TOLERANCE_S: f64 = 0.2;
 /// Smallest reported clock drift over the log.
 const DRIFT_TOLERANCE_S: f64 = 0.005;
+/// Smallest reported step of a clock, and the largest ratio of the scatter around it to that around a line.
+const STEP_TOLERANCE_S: f64 = 0.01;
+const STEP_RATIO: f64 = 0.5;
+/// Smallest part of the messages on a side of a step as a fraction of all, and number of places that are tried.
+const STEP_PARTS: usize = 10;
+const STEP_PLACES: usize = 40;
+/// Most messages of a topic that are used.
+const STEP_POINTS: usize = 2000;
 /// Smallest reported time by which a topic starts later or ends earlier than the IMU.
 const OVERLAP_TOLERANCE_S: f64 = 1.0;
 /// Larger time offsets of the rig are neither delays of a camera nor of a gimbal.
@@ -96,6 +104,18 @@ fn check_future(used: &UsedTopic<'_>, findings: &mut Findings) {
 fn check_drift(used: &UsedTopic<'_>, findings: &mut Findings) {
     let point = |times: &Times| (seconds_from_ns(times.stamp_ns), seconds_from_ns(times.log_time_ns - times.stamp_ns));
     let points: Vec<(f64, f64)> = used.topic.times.iter().map(point).collect();
+    if let Some(Step { at_s, step_s, scatter_s }) = Step::of(&points) {
+        let evidence = format!(
+            "log time minus stamp changes by {:+.1} ms there, and scatters by {:.1} ms on both sides",
+            step_s * 1e3,
+            scatter_s * 1e3
+        );
+        let side = if step_s > 0.0 { "earlier" } else { "later" };
+        let title = format!("stamps of {} are {:.0} ms {side} from {at_s:.1} s on", used.role, step_s.abs() * 1e3);
+        let remedy = "look for a lost or repeated message that shifted the matching of stamps, or a clock that was set";
+        findings.add(Severity::Warning, Area::Time, title, evidence, remedy);
+        return findings.state_times(Some(at_s), None);
+    }
     let (drift, error) = slope(&points);
     let length_s = points.last().map_or(0.0, |last| last.0) - points.first().map_or(0.0, |first| first.0);
     if (drift * length_s).abs() > DRIFT_TOLERANCE_S && drift.abs() > DRIFT_SIGMAS * error {
@@ -109,6 +129,53 @@ fn check_drift(used: &UsedTopic<'_>, findings: &mut Findings) {
         let title = format!("the clock of {} drifts", used.role);
         findings.add(Severity::Warning, Area::Time, title, evidence, remedy);
     }
+}
+
+/// Step of log times less stamps.
+struct Step {
+    at_s: f64,
+    step_s: f64,
+    /// Mean distance from the medians on both sides.
+    scatter_s: f64,
+}
+
+impl Step {
+    /// Step between two constant parts of points (stamp, log time less stamp), in seconds; `None` if a line or a constant
+    /// explains them as well.
+    fn of(points: &[(f64, f64)]) -> Option<Self> {
+        let stride = points.len().div_ceil(STEP_POINTS).max(1);
+        let mut points: Vec<(f64, f64)> = points.iter().copied().step_by(stride).collect();
+        points.sort_by(|one, other| one.0.total_cmp(&other.0));
+        let split = |at: usize| {
+            let (before, after) = points.split_at(at);
+            let both = [before, after].map(middle);
+            let left = scatter(before, both[0]) * before.len() as f64 + scatter(after, both[1]) * after.len() as f64;
+            (left / points.len() as f64, at, both)
+        };
+        let smallest = STEP_PARTS.max(points.len() / STEP_PARTS);
+        let places = (smallest..points.len().saturating_sub(smallest)).step_by((points.len() / STEP_PLACES).max(1));
+        let (_, coarse, _) = places.map(split).min_by(|one, other| one.0.total_cmp(&other.0))?;
+        let near = coarse.saturating_sub(points.len() / STEP_PLACES)..=(coarse + points.len() / STEP_PLACES);
+        let inside = near.filter(|at| (smallest..points.len() - smallest).contains(at));
+        let (scatter_s, at, [before, after]) = inside.map(split).min_by(|one, other| one.0.total_cmp(&other.0))?;
+        let (drift, _) = slope(&points);
+        let start_s = points[0].0;
+        let along: Vec<(f64, f64)> =
+            points.iter().map(|(at_s, late_s)| (*at_s, late_s - drift * (at_s - start_s))).collect();
+        let by_line_s = scatter(&along, middle(&along));
+        let step_s = after - before;
+        (step_s.abs() > STEP_TOLERANCE_S.max(DRIFT_SIGMAS * scatter_s) && scatter_s < STEP_RATIO * by_line_s)
+            .then(|| Self { at_s: points[at].0, step_s, scatter_s })
+    }
+}
+
+fn middle(points: &[(f64, f64)]) -> f64 {
+    median(&points.iter().map(|(_, late_s)| *late_s).collect::<Vec<_>>())
+}
+
+/// Mean distance from a middle.
+fn scatter(points: &[(f64, f64)], middle_s: f64) -> f64 {
+    points.iter().map(|(_, late_s)| (late_s - middle_s).abs()).sum::<f64>() / points.len().max(1) as f64
 }
 
 fn compare_clocks(used: &[UsedTopic<'_>], clocks: &Clocks, findings: &mut Findings) {

@@ -2,13 +2,16 @@
 
 mod clocks;
 pub(super) mod copies;
+mod grid;
 mod publishers;
 mod used_topics;
 
 use self::clocks::check_clocks;
 use self::copies::check_copies;
+use self::grid::tick_s;
 use self::publishers::has_two_publishers;
 use self::used_topics::{UsedTopic, used_topics};
+use super::held::Held;
 use super::report::{Area, Findings, Severity};
 use super::statistics::percentile;
 use super::survey::Survey;
@@ -72,7 +75,11 @@ pub(super) fn check_timing(survey: &Survey, rig: Option<&Rig>, findings: &mut Fi
 fn check_stamps(used: &UsedTopic<'_>, spacing: &Spacing, findings: &mut Findings) {
     let role = used.role.as_str();
     check_order(used, findings);
+    check_held(used, findings);
     check_gaps(role, spacing, used.of_images, findings);
+    if let Some(tick_s) = tick_s(spacing) {
+        return report_grid(used, spacing, tick_s, findings);
+    }
     check_jitter(role, spacing, findings);
     check_rate(role, spacing.period_s, used.nominal_hz, findings);
 }
@@ -145,6 +152,40 @@ fn check_gaps(role: &str, spacing: &Spacing, of_images: bool, findings: &mut Fin
     findings.add(severity, Area::Time, format!("{role} has gaps"), evidence, remedy);
     let ends = |index: &usize| spacing.start_s(*index) + steps[*index];
     findings.state_times(gaps.first().map(|first| spacing.start_s(*first)), gaps.last().map(ends));
+}
+
+/// Reports attitudes of the vehicle and ground truth that hold the content of the message before.
+fn check_held(used: &UsedTopic<'_>, findings: &mut Findings) {
+    let (area, name) = match used.role.as_str() {
+        "vehicle" => (Area::Encoders, "the vehicle's attitude"),
+        "ground truth" => (Area::Log, "the ground truth"),
+        _ => return,
+    };
+    if let Some(held) = Held::of(&used.topic.contents()) {
+        held.report(area, name, "holds its", findings);
+    }
+}
+
+/// Reports stamps that are rounded to multiples of a time.
+fn report_grid(used: &UsedTopic<'_>, spacing: &Spacing, tick_s: f64, findings: &mut Findings) {
+    let role = &used.role;
+    let mean_s = spacing.steps_s.iter().sum::<f64>() / spacing.steps_s.len() as f64;
+    let [shortest_s, longest_s] = [0.1, 0.9].map(|quantile| percentile(&spacing.steps_s, quantile));
+    let title = format!("stamps of {role} are rounded to multiples of {:.1} ms", tick_s * 1e3);
+    let evidence = format!(
+        "steps of {:.1} to {:.1} ms, multiples of {:.3} ms, where the mean step is {:.1} ms: errors up to {:.1} ms",
+        shortest_s * 1e3,
+        longest_s * 1e3,
+        tick_s * 1e3,
+        mean_s * 1e3,
+        tick_s * 1e3
+    );
+    let remedy = "stamp in the driver with a clock that counts microseconds, from the sensor's own clock or trigger";
+    findings.add(Severity::Warning, Area::Time, title, evidence, remedy);
+    check_rate(role, mean_s, used.nominal_hz, findings);
+    if used.of_images {
+        findings.exclude_camera(role);
+    }
 }
 
 /// Reports stamps that are taken on arrival: batches, or steps that scatter.

@@ -65,3 +65,20 @@ fn log_times_replace_stamps_that_were_never_set() {
     let used = &report.topics[1];
     assert!((used.first_s - 0.028).abs() < 1e-9 && used.latency_s == Some(0.0), "{report}");
 }
+
+#[test]
+fn stamps_that_step_or_are_rounded_are_named() {
+    let step = |ms: i64, times: &mut MessageTimes, _: &mut GrayImage| {
+        times.stamp_ns -= if ms > 6000 { 50 * MS } else { 0 };
+        !(6000..6050).contains(&ms)
+    };
+    let words = ["stamps of cam0 are 50 ms earlier from 6.0 s on", "changes by +50.0 ms there"];
+    expect(&Flight { image: step, ..Flight::default() }, Warning, &words);
+    let rounded = |_: i64, times: &mut MessageTimes, _: &mut GrayImage| {
+        let tick_ns = 1_000_000_000 / 64;
+        times.stamp_ns -= times.stamp_ns % tick_ns;
+        true
+    };
+    let words = ["stamps of cam0 are rounded to multiples of 15.6 ms", "where the mean step is 50.0 ms"];
+    expect(&Flight { image: rounded, ..Flight::default() }, Warning, &words);
+}
