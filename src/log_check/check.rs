@@ -59,6 +59,7 @@ pub fn check(log: &FlightLog, rig: Result<&Rig, &LogError>, image_rotations: &[I
         gimbal::frozen_joints::check_frozen_joints(&survey, rig, &imu_facts, &mut findings);
         let rotations = extrinsics::check_rotations(&survey, rig, &imu_facts, image_rotations, &mut findings);
         gimbal::gimbal_imu::check_gimbal_imu(&survey, rig, image_rotations, &mut findings);
+        ground_truth::check_unusable_poses(log, rig, &mut findings);
         let poses = ground_truth::poses_of(log, rig);
         ground_truth::check_ground_truth(&poses, rig, &imu_facts, &rotations.of_imu, &mut findings);
         let compared = Compared {

@@ -6,6 +6,7 @@ use super::super::messages::{self, MessageKind};
 use super::super::{FlightLog, LogError};
 use super::RecordedPose;
 use super::geodesy::Geodetic;
+use crate::flight_log::log::relative_ns;
 use crate::flight_log::messages::cdr::{CdrError, CdrReader};
 use crate::flight_log::stamps::clock::StampClock;
 
@@ -56,7 +57,7 @@ impl FlightLog {
         let mut poses: Vec<RecordedPose> = Vec::new();
         self.for_each_message(topic, |log_time_ns, data| {
             let logged_ns = u64::try_from(self.epoch_ns().saturating_add(log_time_ns)).unwrap_or(0);
-            let pose = read(content, data, &mut origin).ok().flatten();
+            let pose = read(content, data, &mut origin).ok().and_then(|read| read.pose);
             poses.extend(pose.map(|pose| RecordedPose { stamp_ns: clock.stamp_ns(pose.stamp_ns, logged_ns), ..pose }));
             true
         });
@@ -66,6 +67,21 @@ impl FlightLog {
         poses.sort_by_key(|pose| pose.stamp_ns);
         poses.dedup_by_key(|pose| pose.stamp_ns);
         Ok(poses)
+    }
+
+    /// Stamps of the messages of a topic without a usable pose or position, in nanoseconds since the log began, each with
+    /// true for a receiver that states that it has no fix; empty for other topics.
+    pub fn stamps_without_pose(&self, topic: &str) -> Vec<(i64, bool)> {
+        let content = self.topic(topic).and_then(|info| content_of(&info.schema, info.kind));
+        let (mut origin, mut stamps) = (None, Vec::new());
+        if let Some(content) = content {
+            self.for_each_message(topic, |_, data| {
+                let unusable = read(content, data, &mut origin).ok().filter(|read| read.pose.is_none());
+                stamps.extend(unusable.map(|read| (relative_ns(read.stamp_ns, self.epoch_ns()), !read.has_fix)));
+                true
+            });
+        }
+        stamps
     }
 }
 
@@ -80,38 +96,41 @@ fn content_of(schema: &str, kind: Option<MessageKind>) -> Option<Content> {
     }
 }
 
+/// Message of a trajectory.
+struct Read {
+    /// Header stamp, in nanoseconds.
+    stamp_ns: i64,
+    /// `None` for a message without a usable pose.
+    pose: Option<RecordedPose>,
+    /// False for a receiver that states that it has no fix.
+    has_fix: bool,
+}
+
 /// Reads the pose of a message; `origin` is the first fix of a receiver.
-fn read(content: Content, data: &[u8], origin: &mut Option<Geodetic>) -> Result<Option<RecordedPose>, CdrError> {
-    let finite = |position_m: &Vector3<f64>| position_m.iter().all(|value| value.is_finite());
-    match content {
-        Content::Pose(kind) => {
-            let message = messages::read_pose(kind, data)?;
-            Ok(message.pose.map(|pose| RecordedPose {
-                stamp_ns: message.stamp_ns,
-                position_m: pose.translation_m,
-                rotation: Some(pose.rotation),
-            }))
-        }
-        Content::Point => {
-            let mut reader = CdrReader::new(data)?;
-            let header = messages::read_header(&mut reader)?;
-            let position_m = Vector3::from(reader.read_f64s::<3>()?);
-            let pose = RecordedPose { stamp_ns: header.stamp_ns, position_m, rotation: None };
-            Ok(finite(&position_m).then_some(pose))
-        }
-        Content::Fix => {
-            let mut reader = CdrReader::new(data)?;
-            let header = messages::read_header(&mut reader)?;
-            // −1: no fix.
-            let status = reader.read_u8()?.cast_signed();
-            let _service = reader.read_u16()?;
-            let [latitude_deg, longitude_deg, altitude_m] = reader.read_f64s::<3>()?;
-            let place = Geodetic::from_deg(latitude_deg, longitude_deg, altitude_m).filter(|_| status >= 0);
-            let Some(place) = place else { return Ok(None) };
-            let origin = *origin.get_or_insert(place);
-            let position_m = place.east_north_up_m(origin);
-            let pose = RecordedPose { stamp_ns: header.stamp_ns, position_m, rotation: None };
-            Ok(finite(&position_m).then_some(pose))
-        }
+fn read(content: Content, data: &[u8], origin: &mut Option<Geodetic>) -> Result<Read, CdrError> {
+    if let Content::Pose(kind) = content {
+        let message = messages::read_pose(kind, data)?;
+        let pose = message.pose.map(|pose| RecordedPose {
+            stamp_ns: message.stamp_ns,
+            position_m: pose.translation_m,
+            rotation: Some(pose.rotation),
+        });
+        return Ok(Read { stamp_ns: message.stamp_ns, pose, has_fix: true });
     }
+    let mut reader = CdrReader::new(data)?;
+    let stamp_ns = messages::read_header(&mut reader)?.stamp_ns;
+    let mut has_fix = true;
+    let position_m = if content == Content::Point {
+        Some(Vector3::from(reader.read_f64s::<3>()?))
+    } else {
+        // −1: no fix.
+        has_fix = reader.read_u8()?.cast_signed() >= 0;
+        let _service = reader.read_u16()?;
+        let [latitude_deg, longitude_deg, altitude_m] = reader.read_f64s::<3>()?;
+        let place = Geodetic::from_deg(latitude_deg, longitude_deg, altitude_m).filter(|_| has_fix);
+        place.map(|place| place.east_north_up_m(*origin.get_or_insert(place)))
+    };
+    let finite = position_m.filter(|position_m| position_m.iter().all(|value| value.is_finite()));
+    let pose = finite.map(|position_m| RecordedPose { stamp_ns, position_m, rotation: None });
+    Ok(Read { stamp_ns, pose, has_fix })
 }

@@ -66,6 +66,33 @@ pub(super) fn poses_of(log: &FlightLog, rig: &Rig) -> Vec<(i64, RigidTransform)>
     recorded.into_iter().filter_map(pose).collect()
 }
 
+/// Reports messages of the ground truth without a usable pose or position; they are not used.
+pub(super) fn check_unusable_poses(log: &FlightLog, rig: &Rig, findings: &mut Findings) {
+    let Some(topic) = rig.ground_truth_topic.as_deref() else { return };
+    let unusable = log.stamps_without_pose(topic);
+    let all = log.topic(topic).map_or(0, |info| info.count);
+    let [without_fix, wrong] = [true, false].map(|is_fix| {
+        let of_kind = unusable.iter().filter(|(_, has_no_fix)| *has_no_fix == is_fix);
+        of_kind.map(|(stamp_ns, _)| *stamp_ns).collect::<Vec<i64>>()
+    });
+    let texts = [
+        (without_fix, "positions of the ground truth have no fix", "the receiver says so (status −1)"),
+        (wrong, "poses of the ground truth are no poses", "positions are not finite, or quaternions have no length"),
+    ];
+    for (stamps_ns, title, reason) in texts {
+        let (Some(first), Some(last)) = (stamps_ns.iter().min(), stamps_ns.iter().max()) else { continue };
+        let evidence = format!(
+            "{} of {all} messages, the first at {:.3} s, the last at {:.3} s: {reason}; they are not used",
+            stamps_ns.len(),
+            seconds_from_ns(*first),
+            seconds_from_ns(*last)
+        );
+        let remedy = "errors are computed from the others; record until and from when it is valid";
+        findings.add(Severity::Warning, Area::Log, title, evidence, remedy);
+        findings.state_interval(stamps_ns.iter().copied());
+    }
+}
+
 /// Compares the ground truth of the rig with the IMU, if the log has one with attitudes. `rotations_of_imu` are rotations of
 /// the IMU, in its frame, that would explain the orientations of the cameras.
 pub(super) fn check_ground_truth(
