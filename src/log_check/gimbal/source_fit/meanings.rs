@@ -1,6 +1,6 @@
 //! Alternative interpretations of a gimbal's attitude, and quaternions that a driver fills in wrongly.
 
-use nalgebra::{Quaternion, UnitQuaternion};
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use crate::files::rig::attitude::entries;
 use crate::log_check::permutations::permutations;
@@ -94,7 +94,16 @@ enum QuaternionFault {
     ScalarFirst,
     /// The fields w, x, y, z contain x, y, z, w.
     ScalarLast,
+    /// Angles of this order of rotations were put together in the order yaw, pitch, roll.
+    Order(Order),
 }
+
+/// Axes of the rotations by which Euler angles are put together, about moving axes: 0 is roll, 1 pitch, 2 yaw.
+type Order = [usize; 3];
+
+/// Orders other than yaw, pitch, roll, the usual one of gimbals first.
+const ORDERS: [Order; 5] = [[2, 0, 1], [1, 0, 2], [0, 1, 2], [1, 2, 0], [0, 2, 1]];
+const ANGLES: [&str; 3] = ["roll", "pitch", "yaw"];
 
 /// Topics of the quaternions with a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -111,22 +120,35 @@ pub(super) struct Corrected {
 }
 
 impl QuaternionFault {
-    const ALL: [Self; 3] = [Self::Inverse, Self::ScalarFirst, Self::ScalarLast];
+    fn all() -> impl Iterator<Item = Self> {
+        [Self::Inverse, Self::ScalarFirst, Self::ScalarLast].into_iter().chain(ORDERS.map(Self::Order))
+    }
 
     fn correct(self, read: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
         match self {
             Self::Inverse => read.inverse(),
             Self::ScalarFirst => UnitQuaternion::new_unchecked(Quaternion::new(read.i, read.j, read.k, read.w)),
             Self::ScalarLast => UnitQuaternion::new_unchecked(Quaternion::new(read.k, read.w, read.i, read.j)),
+            Self::Order(order) => {
+                let angles_rad = <[f64; 3]>::from(read.euler_angles());
+                let axes = [Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()];
+                let about = |axis: usize| UnitQuaternion::from_axis_angle(&axes[axis], angles_rad[axis]);
+                order.into_iter().fold(UnitQuaternion::identity(), |outer, axis| outer * about(axis))
+            }
         }
     }
 
-    fn describe(self) -> &'static str {
-        match self {
+    fn describe(self) -> String {
+        let text = match self {
+            Self::Order(order) => {
+                let names = order.map(|axis| ANGLES[axis]).join(", ");
+                return format!("are made of angles of the order {names}, put together in the order yaw, pitch, roll");
+            }
             Self::Inverse => "are inverted: they rotate the other way",
             Self::ScalarFirst => "are in the order w, x, y, z: the fields x, y, z, w contain w, x, y, z",
             Self::ScalarLast => "are in the order x, y, z, w: the fields w, x, y, z contain x, y, z, w",
-        }
+        };
+        text.to_owned()
     }
 }
 
@@ -134,7 +156,7 @@ impl QuaternionFault {
 pub(super) fn corrected(attitude: &AttitudeSurvey) -> Vec<Corrected> {
     let places: &[Faulty] =
         if attitude.has_vehicle() { &[Faulty::Gimbal, Faulty::Vehicle, Faulty::Both] } else { &[Faulty::Gimbal] };
-    let all = places.iter().flat_map(|faulty| QuaternionFault::ALL.map(|fault| (*faulty, fault)));
+    let all = places.iter().flat_map(|faulty| QuaternionFault::all().map(|fault| (*faulty, fault)));
     let correct = |(faulty, fault): (Faulty, QuaternionFault)| {
         let change =
             |is_faulty: bool| move |read: &UnitQuaternion<f64>| if is_faulty { fault.correct(read) } else { *read };

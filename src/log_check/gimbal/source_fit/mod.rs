@@ -28,6 +28,8 @@ const MIN_ROTATION_RAD: f64 = 0.02;
 const FITTING_RATIO: f64 = 0.25;
 /// Another interpretation is preferred if its misfit is below this ratio of the rig's.
 const BETTER_RATIO: f64 = 0.6;
+/// Quaternions are wrong if their correction leaves this ratio of the misfit of an interpretation that fits.
+const WRONG_QUATERNIONS: f64 = 0.4;
 /// Time offsets (`t_imu = t_gimbal + shift`) beyond the rig's with which every interpretation is tried: delays of
 /// gimbals reach 0.2 s.
 const COARSE_SHIFTS_S: [f64; 5] = [0.0, -0.05, -0.1, -0.15, -0.2];
@@ -112,7 +114,7 @@ pub(crate) fn check_source(
     let fits = best.misfit_rad < FITTING_RATIO * rotation_rad;
     if !fits {
         findings.exclude(Measurement::Joints);
-        if fit.check_quaternions(source, given_s, &listed, findings) {
+        if fit.check_quaternions(source, given_s, FITTING_RATIO * rotation_rad, &listed, findings) {
             return None;
         }
         let title = "no interpretation of gimbal.source predicts the rotations in the images";
@@ -123,6 +125,10 @@ pub(crate) fn check_source(
         return None;
     }
     let better = best.misfit_rad < BETTER_RATIO * given.misfit_rad;
+    if fit.check_quaternions(source, given_s, WRONG_QUATERNIONS * best.misfit_rad, &listed, findings) {
+        findings.exclude(Measurement::Joints);
+        return None;
+    }
     let (chosen, equivalent) =
         if better { fit.within_reach(gimbal, best, &others) } else { (given.clone(), Vec::new()) };
     let evidence = format!(
@@ -255,9 +261,16 @@ impl SourceFit<'_> {
         (chosen, near)
     }
 
-    /// Reports quaternions that were filled in wrongly, if their correction predicts the rotations; returns true if it
-    /// does.
-    fn check_quaternions(&self, source: &AttitudeSource, given_s: f64, listed: &str, findings: &mut Findings) -> bool {
+    /// Reports quaternions that were filled in wrongly, if their correction predicts the rotations to a misfit in radians;
+    /// returns true if it does.
+    fn check_quaternions(
+        &self,
+        source: &AttitudeSource,
+        given_s: f64,
+        largest_rad: f64,
+        listed: &str,
+        findings: &mut Findings,
+    ) -> bool {
         let rotation_rad = self.rotation_rad();
         let tried = corrected(self.attitude).into_iter().map(|corrected| {
             let fit = SourceFit { attitude: &corrected.attitude, spans: self.spans.clone(), offset: self.offset };
@@ -265,7 +278,7 @@ impl SourceFit<'_> {
             (misfit_rad, corrected.fault)
         });
         let Some((misfit_rad, fault)) = tried.min_by(|a, b| a.0.total_cmp(&b.0)) else { return false };
-        if misfit_rad > FITTING_RATIO * rotation_rad {
+        if misfit_rad > largest_rad {
             return false;
         }
         let evidence = format!(

@@ -256,4 +256,18 @@ fn quaternions_that_are_filled_in_wrongly_are_named() {
     let source = "{topic: /gimbal, type: quaternion, frame: earth, axes: frd, vehicle: /vehicle, vehicle_axes: flu}";
     expect(inverted, 0, source, Severity::Error, &["the quaternions of /gimbal are inverted", "correct the driver"]);
     expect(scalar_first, 0, source, Severity::Error, &["the quaternions of /gimbal are in the order w, x, y, z"]);
+    // Yaw, roll and pitch of a gimbal put together as yaw, pitch and roll.
+    let other_order: Recorded = |writer, times, gimbal, _| {
+        let [x, y, z] = [Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()];
+        let matrix = in_frd(gimbal).to_rotation_matrix();
+        // Of Rz(yaw) Rx(roll) Ry(pitch).
+        let roll = matrix[(2, 1)].asin();
+        let (yaw, pitch) = ((-matrix[(0, 1)]).atan2(matrix[(1, 1)]), (-matrix[(2, 0)]).atan2(matrix[(2, 2)]));
+        let about = |axis, angle| UnitQuaternion::from_axis_angle(&axis, angle);
+        let rotation = about(z, yaw) * about(y, pitch) * about(x, roll);
+        writer.write_rotation("/gimbal", "body", times, &rotation).unwrap();
+    };
+    let source = "{topic: /gimbal, type: quaternion, frame: body, axes: frd}";
+    let words = ["the quaternions of /gimbal are made of angles of the order yaw, roll, pitch"];
+    expect(other_order, 0, source, Severity::Error, &words);
 }
