@@ -47,6 +47,10 @@ fn sizes(kind: FaultKind) -> Sizes {
         FaultKind::ImuNoise | FaultKind::EncoderNoise => Values([&[3.0], &[10.0], &[30.0]]),
         FaultKind::ImageRegion => Not("which images the rest of the view had is unknown"),
         FaultKind::Clocks => Not("two faults at once"),
+        FaultKind::FocalPeriod => Values([&[1.015, 4.0], &[1.04, 3.0], &[1.1, 6.0]]),
+        FaultKind::Radial => Values([&[-0.06], &[-0.15], &[-0.35]]),
+        FaultKind::ImageOrder => Not("images are written in the order of their stamps"),
+        FaultKind::JointPlay => Not("the direction of motion is unknown where readings are planted"),
         FaultKind::FocalPieces => Not("several zooms, one after the other"),
         FaultKind::CameraDrift => Not("images would have to be exposed by a clock of another rate"),
         FaultKind::Chain => Not("a distance and an angle have no direction"),
@@ -65,7 +69,7 @@ pub(crate) fn is_of_rig(kind: FaultKind) -> bool {
 
 /// True if other images have to be rendered.
 pub(crate) fn is_of_images(kind: FaultKind) -> bool {
-    matches!(kind, FaultKind::Zoom | FaultKind::ImageFlip)
+    matches!(kind, FaultKind::Zoom | FaultKind::FocalPeriod | FaultKind::ImageFlip)
 }
 
 /// A fault planted in a flight; `None` for a control.

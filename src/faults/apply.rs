@@ -1,10 +1,12 @@
 //! Correction of measurements by faults: samples, joint angles, pixels and bearings, stamps. The inverse of a fault plants it.
 
+use std::f64::consts::TAU;
+
 use nalgebra::{Vector2, Vector3};
 
 use super::fault::{Choice, Fault, ImageFlip};
 use super::table::{Change, FaultKind, Sensor};
-use crate::camera::CameraModel;
+use crate::camera::{CameraModel, Distortion};
 use crate::sensors::{ImuSample, JointAngles};
 
 /// Pinhole intrinsics relative to the rig's.
@@ -14,23 +16,36 @@ pub struct LensChange {
     pub focal: f64,
     /// Offset of the true principal point in units of the rig's focal length.
     pub centre: [f64; 2],
+    /// Coefficient `λ` of the distortion that the rig lacks, by the division model (Fitzgibbon, "Simultaneous linear estimation
+    /// of multiple view geometry and lens distortion", CVPR 2001): `x_true = x / (1 + λ r²)`. About `k1` of a radial model.
+    pub radial: f64,
 }
 
-/// True angle of a joint from readings: `scale · reading(source) + offset_rad`.
+/// True angle of a joint from readings: `scale · reading(source) + offset_rad`, and `play_rad` times the direction of motion,
+/// from −1 to 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointMap {
     /// Joint of the rig under whose name the readings are recorded.
     pub source: usize,
     pub scale: f64,
     pub offset_rad: f64,
+    pub play_rad: f64,
 }
 
 impl LensChange {
-    pub const NONE: Self = Self { focal: 1.0, centre: [0.0; 2] };
+    pub const NONE: Self = Self { focal: 1.0, centre: [0.0; 2], radial: 0.0 };
 
-    /// Camera with these intrinsics from one with the rig's.
+    /// Camera with these intrinsics from one with the rig's. A distortion that the rig lacks is added to `k1`, which equals the
+    /// division model to first order; to lenses without such a coefficient none is added.
     pub fn camera(&self, rig: &CameraModel) -> CameraModel {
         let mut camera = rig.clone();
+        match &mut camera.distortion {
+            Distortion::None if self.radial != 0.0 => {
+                camera.distortion = Distortion::Radtan([self.radial, 0.0, 0.0, 0.0]);
+            }
+            Distortion::Radtan([k1, ..]) => *k1 += self.radial,
+            _ => {}
+        }
         let [fx, fy, cx, cy] = rig.intrinsics_px;
         let [dx, dy] = self.centre;
         camera.intrinsics_px = [fx * self.focal, fy * self.focal, cx + dx * fx, cy + dy * fy];
@@ -40,7 +55,10 @@ impl LensChange {
     /// Bearing with these intrinsics from one with the rig's.
     pub fn bearing(&self, bearing: &Vector3<f64>) -> Vector3<f64> {
         let [x, y] = [0, 1].map(|axis| (bearing[axis] - self.centre[axis] * bearing.z) / self.focal);
-        Vector3::new(x, y, bearing.z).normalize()
+        let z = bearing.z;
+        // In units of z: x / (1 + λ r²) : 1 = x : 1 + λ r².
+        let z = if self.radial == 0.0 || z <= 0.0 { z } else { z * (1.0 + self.radial * (x * x + y * y) / (z * z)) };
+        Vector3::new(x, y, z).normalize()
     }
 
     /// Approximate rotation vector with these intrinsics from one with the rig's: a shorter focal length widens rotations
@@ -128,7 +146,10 @@ impl Fault {
         match self.kind {
             FaultKind::Focal => LensChange { focal: self.value(0), ..LensChange::NONE },
             FaultKind::PrincipalPoint => LensChange { centre: [self.value(0), self.value(1)], ..LensChange::NONE },
-            FaultKind::Intrinsics => LensChange { focal: self.value(0), centre: [self.value(1), self.value(2)] },
+            FaultKind::Intrinsics => {
+                LensChange { focal: self.value(0), centre: [self.value(1), self.value(2)], ..LensChange::NONE }
+            }
+            FaultKind::Radial => LensChange { radial: self.value(0), ..LensChange::NONE },
             _ => LensChange::NONE,
         }
     }
@@ -141,6 +162,7 @@ impl Fault {
                 let reached = if over_s > 0.0 { (since_s / over_s).clamp(0.0, 1.0) } else { 1.0 };
                 1.0 + (factor - 1.0) * reached
             }
+            FaultKind::FocalPeriod => 1.0 + (self.value(0) - 1.0) * (TAU * since_s / self.value(1)).sin(),
             _ => self.lens().focal,
         }
     }
@@ -170,12 +192,14 @@ impl Fault {
         match self.kind {
             FaultKind::JointReversed => {
                 for (number, place) in places.into_iter().enumerate() {
-                    let JointMap { source, scale, offset_rad } = maps[place];
-                    maps[place] = JointMap { source, scale: -scale, offset_rad: self.value(number) - offset_rad };
+                    let JointMap { source, scale, offset_rad, play_rad } = maps[place];
+                    let offset_rad = self.value(number) - offset_rad;
+                    maps[place] = JointMap { source, scale: -scale, offset_rad, play_rad: -play_rad };
                 }
             }
             FaultKind::JointsSwapped => places.chunks_exact(2).for_each(|pair| maps.swap(pair[0], pair[1])),
             FaultKind::JointOffset => places.into_iter().for_each(|place| maps[place].offset_rad += self.value(0)),
+            FaultKind::JointPlay => places.into_iter().for_each(|place| maps[place].play_rad += self.value(0)),
             FaultKind::JointScale => {
                 let is_faulty = |place: usize| self.joints.is_empty() || places.contains(&place);
                 for (_, map) in maps.iter_mut().enumerate().filter(|(place, _)| is_faulty(*place)) {
@@ -202,7 +226,7 @@ pub fn check_joints(faults: &[Fault], names: &[String]) -> Result<(), String> {
 /// Maps of the readings of joints with these names, after all faults in their order.
 pub fn joint_maps<'a>(faults: impl IntoIterator<Item = &'a Fault>, names: &[String]) -> Vec<JointMap> {
     let mut maps: Vec<JointMap> =
-        (0..names.len()).map(|source| JointMap { source, scale: 1.0, offset_rad: 0.0 }).collect();
+        (0..names.len()).map(|source| JointMap { source, scale: 1.0, offset_rad: 0.0, play_rad: 0.0 }).collect();
     faults.into_iter().for_each(|fault| fault.change_maps(names, &mut maps));
     maps
 }
@@ -213,7 +237,7 @@ pub fn correct_joint_angles(faults: &[Fault], names: &[String], angles: &mut Joi
     let given = angles.clone();
     let count = given.angles_rad.len();
     for (joint, map) in joint_maps(faults, names).into_iter().enumerate() {
-        let JointMap { source, scale, offset_rad } = map;
+        let JointMap { source, scale, offset_rad, .. } = map;
         let is_changed = source != joint || scale != 1.0 || offset_rad != 0.0;
         if !is_changed || joint.max(source) >= count {
             continue;

@@ -1,11 +1,19 @@
 //! A fault of the measurements or of the rig with its values.
 
+use std::f64::consts::PI;
+
 use nalgebra::{UnitQuaternion, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::table::{Change, FaultKind, LONGEST_SHIFT_S, Parameter, Part};
 use crate::geometry::{SignedAxes, so3};
+use crate::sensors::STANDARD_GRAVITY_M_PER_S2;
 use crate::text::Named;
+
+/// Size of a degree in radians.
+const DEGREE_RAD: f64 = PI / 180.0;
+/// Largest factor by which a range setting or a gear changes the scale of a sensor in its unit.
+const LARGEST_SCALE: f64 = 5.0;
 
 /// One of a few changes that have no number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -126,6 +134,7 @@ impl Fault {
         match self.kind {
             FaultKind::CameraDrift => self.value(1),
             FaultKind::Mount => self.mount().angle(),
+            FaultKind::ImageOrder => self.values.iter().copied().map(f64::abs).fold(0.0, f64::max),
             FaultKind::PrincipalPoint | FaultKind::Intrinsics => {
                 let lens = self.lens();
                 (lens.focal - 1.0).abs().max(lens.centre[0].hypot(lens.centre[1]))
@@ -137,6 +146,20 @@ impl Fault {
     /// True if the fault is larger than the faults of sound sensors and rigs, [`Row::noticeable`](super::Row).
     pub fn is_noticeable(&self) -> bool {
         self.kind.row().noticeable.is_none_or(|noticeable| self.size().abs() > noticeable)
+    }
+
+    /// True for a value that hardware can have: the scale of a sensor is near one, or that of another unit.
+    pub fn is_possible(&self) -> bool {
+        let units: &[f64] = match self.kind {
+            FaultKind::GyroscopeScale => &[1.0, DEGREE_RAD, 1.0 / DEGREE_RAD, 1e-3, 1e3],
+            FaultKind::AccelerometerScale => {
+                &[1.0, STANDARD_GRAVITY_M_PER_S2, 1.0 / STANDARD_GRAVITY_M_PER_S2, 1e-3, 1e3]
+            }
+            FaultKind::JointScale if !self.joints.is_empty() => &[1.0, DEGREE_RAD, 1.0 / DEGREE_RAD],
+            _ => return true,
+        };
+        let possible = 1.0 / LARGEST_SCALE..LARGEST_SCALE;
+        units.iter().any(|unit| possible.contains(&(self.value(0) / unit)))
     }
 
     /// True if the fault makes results useless, [`Row::useless`](super::Row).

@@ -80,6 +80,21 @@ impl Subject<'_> {
                 FIX_ZOOM,
             ),
             FaultKind::FocalPieces => texts(self.focal_pieces(fault), FIX_ZOOM),
+            FaultKind::FocalPeriod => texts(
+                format!(
+                    "the focal length of {camera} varies by ±{:.1} % with a period of {:.1} s",
+                    100.0 * (first - 1.0),
+                    fault.value(1)
+                ),
+                "fix the focus of the lens, and switch off zoom and digital stabilization",
+            ),
+            FaultKind::Radial => texts(
+                format!("the images of {camera} have a radial distortion that the rig lacks, k1 of about {first:+.2}"),
+                format!(
+                    "calibrate {camera} with its distortion, or record the rectified images that belong to this CameraInfo"
+                ),
+            ),
+            FaultKind::ImageOrder => self.image_order(fault),
             FaultKind::ImageFlip | FaultKind::ImageRegion => self.images(fault.choice),
             FaultKind::CameraClock => {
                 let given_s = self.camera().map_or(0.0, |camera| camera.timeshift_cam_imu_s);
@@ -112,6 +127,14 @@ impl Subject<'_> {
             ),
             FaultKind::JointOffset => self.joint_offset(fault),
             FaultKind::JointScale => joint_scale(fault),
+            FaultKind::JointPlay => texts(
+                format!(
+                    "the reading of joint {} depends on its direction of motion: play of {:.1}°",
+                    quoted(&fault.joints),
+                    2.0 * first.abs().to_degrees()
+                ),
+                "measure the angle behind the gear, remove the play, or raise gimbal.encoder_sigma to it",
+            ),
             FaultKind::EncoderNoise => self.encoder_noise(first),
             FaultKind::ImuAxes | FaultKind::GyroscopeAxes | FaultKind::AccelerometerAxes => axes(fault),
             FaultKind::GyroscopeScale | FaultKind::AccelerometerScale => imu_scale(fault),
@@ -225,6 +248,29 @@ impl Subject<'_> {
         }
     }
 
+    fn image_order(&self, fault: &Fault) -> (String, String) {
+        let camera = self.camera_key;
+        let count = fault.values.len();
+        let period_s = self.camera().map_or(f64::INFINITY, |camera| 1.0 / camera.rate_hz);
+        let places: Vec<f64> = fault.values.iter().map(|shift_s| shift_s / period_s).collect();
+        let listed: Vec<String> = fault.values.iter().map(|shift_s| format!("{:+.0}", 1e3 * shift_s)).collect();
+        let times = format!("{} ms", listed.join(", "));
+        let is_whole = places.iter().all(|place| (place - place.round()).abs() < WHOLE_PLACE);
+        if is_whole && places.iter().any(|place| place.round() != 0.0) {
+            return texts(
+                format!(
+                    "images of {camera} are not in the order of their stamps: in cycles of {count} they are {times} off"
+                ),
+                "write the images in the order of exposure, each with its own stamp (decoding order is not the order of \
+                 exposure)",
+            );
+        }
+        texts(
+            format!("the stamps of {camera} are wrong in a cycle of {count} images, by {times}"),
+            "stamp every image at its exposure; two sources that take turns need two topics",
+        )
+    }
+
     fn shutter(&self, readout_s: f64, sigma_s: f64) -> (String, String) {
         let camera = self.camera_key;
         let given_s = self.camera().map_or(0.0, |camera| camera.readout_s);
@@ -294,6 +340,8 @@ impl Subject<'_> {
     }
 }
 
+/// Largest distance of a shift from whole periods of the images at which images are exchanged, in periods.
+const WHOLE_PLACE: f64 = 0.25;
 /// Words after a quantity of which the search has found no value.
 const BEYOND_SEARCH: &str = "beyond the searched range";
 /// Remedy of a focal length that changes.

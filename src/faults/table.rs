@@ -30,6 +30,9 @@ pub enum FaultKind {
     JointOffset,
     /// Values: factor on the readings of a joint, or of all joints.
     JointScale,
+    /// Readings change with the direction of motion. Values: angle to add in the positive direction, half the negative play,
+    /// in radians.
+    JointPlay,
     /// Axes of gyroscope and accelerometer.
     ImuAxes,
     GyroscopeAxes,
@@ -48,6 +51,12 @@ pub enum FaultKind {
     Intrinsics,
     /// Values: time in seconds and ratio to the rig's focal length of each piece with a constant one.
     FocalPieces,
+    /// The focal lengths vary periodically. Values: largest ratio to the mean one, and the period in seconds.
+    FocalPeriod,
+    /// Distortion that the rig lacks. Values: coefficient `λ` of the division model, see [`LensChange`](super::LensChange).
+    Radial,
+    /// Images under the stamps of others. Values: seconds to add to the stamps of the images of a cycle, one after the other.
+    ImageOrder,
     /// Values: seconds to add to `timeshift_cam_imu`, and their change per second since the log began.
     CameraDrift,
     /// The mount of the camera moves. Values: rotation vector against the rig's orientation, camera frame, in radians.
@@ -192,6 +201,8 @@ const SHIFT: Parameter = Parameter { step: 2e-3, sigma: 0.2, largest: 0.05, chan
 const JOINT_SHIFT: Parameter = Parameter { step: -2e-3, ..SHIFT };
 const DRIFT: Parameter = Parameter { step: 1e-4, sigma: 0.01, largest: 0.005, change: Change::Sum };
 const OFFSET: Parameter = Parameter { step: 1e-3, sigma: 1.5, largest: 0.5, change: Change::Sum };
+const PLAY: Parameter = Parameter { step: 2e-3, sigma: 0.1, largest: 0.05, change: Change::Sum };
+const RADIAL: Parameter = Parameter { step: 1e-2, sigma: 0.5, largest: 0.2, change: Change::Sum };
 const ROTATION: Parameter = Parameter { step: 1e-3, sigma: 1.0, largest: 0.5, change: Change::Rotation };
 
 /// All kinds of faults; messages list the corrections in this order.
@@ -249,6 +260,10 @@ pub const TABLE: &[Row] = &[
         .tried(&[DEGREE, 1.0 / DEGREE])
         .within(&[FaultKind::EncoderNoise])
         .useless(USELESS_RATIO),
+    Row::new(FaultKind::JointPlay, "joint_play", Sensor::Joints, Area::Encoders)
+        .fitted(&[PLAY], &[-0.01, -0.03, -0.08, 0.01, 0.03])
+        .noticeable(0.006)
+        .within(&[FaultKind::EncoderNoise]),
     Row::new(FaultKind::ImuAxes, "imu_axes", Sensor::Imu, Area::Imu)
         .corrected("imu-axes", &[Part::Axes], "y/x/-z")
         .useless(0.0),
@@ -279,6 +294,15 @@ pub const TABLE: &[Row] = &[
         .fitted(&[FOCAL, CENTRE], &[])
         .useless(USELESS_RATIO),
     Row::new(FaultKind::FocalPieces, "focal_pieces", Sensor::Camera, Area::Intrinsics).useless(0.0),
+    Row::new(FaultKind::FocalPeriod, "focal_period", Sensor::Camera, Area::Intrinsics)
+        .noticeable(0.01)
+        .within(&[FaultKind::FocalPieces])
+        .useless(USELESS_RATIO),
+    Row::new(FaultKind::Radial, "radial_distortion", Sensor::Camera, Area::Intrinsics)
+        .fitted(&[RADIAL], &[0.0])
+        .noticeable(0.03)
+        .useless(0.1),
+    Row::new(FaultKind::ImageOrder, "image_order", Sensor::Camera, Area::Images).useless(0.01),
     Row::new(FaultKind::CameraDrift, "camera_drift", Sensor::Camera, Area::Time)
         .fitted(&[SHIFT, DRIFT], &[0.0])
         .noticeable(2e-4),

@@ -72,9 +72,10 @@ impl Planting {
 
     /// Camera at a time in seconds if its focal length differs from the one of its model.
     pub(super) fn zoomed(&self, model: &CameraModel, time_s: f64) -> Option<CameraModel> {
-        let zooms = self.faults.iter().filter(|fault| fault.kind == FaultKind::Zoom && acts_at(fault, time_s));
+        let zooms = |fault: &&Fault| matches!(fault.kind, FaultKind::Zoom | FaultKind::FocalPeriod);
+        let acting = self.faults.iter().filter(|fault| zooms(fault) && acts_at(fault, time_s));
         let factor = |fault: &Fault| fault.focal_factor(time_s - fault.since_s.unwrap_or(0.0));
-        let lens = LensChange { focal: zooms.map(factor).product(), ..LensChange::NONE };
+        let lens = LensChange { focal: acting.map(factor).product(), ..LensChange::NONE };
         (lens != LensChange::NONE).then(|| lens.camera(model))
     }
 

@@ -1,5 +1,7 @@
 //! Rotations of a camera between its images with the measurements that predict them, as recorded or with a correction.
 
+use std::collections::BTreeSet;
+
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
@@ -8,7 +10,7 @@ use super::readout::between_first_rows;
 use crate::faults::{Fault, JointMap, LensChange, Sensor, joint_maps};
 use crate::flight_log::stream::angle_fit::FittedAngle;
 use crate::frontend::readout::{RowObservation, RowTrack};
-use crate::geometry::{ns_from_seconds, seconds_from_ns, so3};
+use crate::geometry::{ns_from_seconds, seconds_from_ns, so3, wrap_angle};
 use crate::gimbal::ClassicalChain;
 use crate::log_check::imu::ImuFacts;
 use crate::log_check::report::ImageRotation;
@@ -17,6 +19,17 @@ use crate::sensors::{AngularRates, CameraRig, Rig};
 
 /// Length over which the rotations of a camera on joints are joined, in seconds: the angles of joints are noisy.
 pub(crate) const JOINED_S: f64 = 0.3;
+
+/// Number of rotations with which other lenses are tried first, and of consecutive ones in a block.
+const THINNED: usize = 200;
+const BLOCK: usize = 10;
+/// Difference of stamps that are the same, in nanoseconds: rotations are stamped by way of seconds.
+const SAME_NS: i64 = 1_000;
+/// Samples to either side over which an angle is smoothed for the direction of a joint's motion, and the change by which it
+/// turns back, in standard deviations and in radians.
+const SMOOTHED: usize = 8;
+const MOVING_SIGMAS: f64 = 2.0;
+const MOVING_RAD: f64 = 1e-3;
 
 /// Rotation between two images that need not be consecutive.
 #[derive(Clone, Debug)]
@@ -49,6 +62,8 @@ pub(crate) struct RotationData<'a> {
     images: &'a [ImageRotation],
     /// Between the first rows of consecutive images.
     pub(crate) measured: Vec<MeasuredRotation>,
+    /// Stamps of the first images of the rotations that are used, `None` for all.
+    used_ns: Option<BTreeSet<i64>>,
 }
 
 impl<'a> RotationData<'a> {
@@ -61,7 +76,7 @@ impl<'a> RotationData<'a> {
         readout_s: f64,
     ) -> Self {
         let measured = first_rows(camera, images, readout_s);
-        Self { survey, rig, imu_facts, camera, readout_s, delay_s: 0.0, images, measured }
+        Self { survey, rig, imu_facts, camera, readout_s, delay_s: 0.0, images, measured, used_ns: None }
     }
 
     /// The data with the camera's stamps changed by a time in seconds.
@@ -76,25 +91,88 @@ impl<'a> RotationData<'a> {
 
     /// Rotations with other intrinsics, from the features.
     pub(crate) fn with_lens(&self, lens: &LensChange) -> Vec<MeasuredRotation> {
-        if *lens == LensChange::NONE {
-            return self.measured.clone();
-        }
-        let observation =
-            |seen: &RowObservation| RowObservation { bearing: lens.bearing(&seen.bearing), row: seen.row };
-        let track =
-            |track: &RowTrack| RowTrack { previous: observation(&track.previous), now: observation(&track.now) };
+        if *lens == LensChange::NONE { self.measured.clone() } else { self.with_lens_at(|_| *lens) }
+    }
+
+    /// Rotations with intrinsics that depend on the stamp of an image, in seconds since the log began.
+    pub(crate) fn with_lens_at(&self, lens_at: impl Fn(f64) -> LensChange) -> Vec<MeasuredRotation> {
+        let observation = |lens: &LensChange, seen: &RowObservation| RowObservation {
+            bearing: lens.bearing(&seen.bearing),
+            row: seen.row,
+        };
         let of_camera = self.images.iter().filter(|image| image.camera_key == self.camera.key);
-        let changed = of_camera.map(|image| ImageRotation {
-            second_from_first: so3::exp(&lens.rotation(&so3::log(&image.second_from_first))),
-            tracks: image.tracks.iter().map(track).collect(),
-            ..image.clone()
+        let changed = of_camera.filter(|image| self.is_used(image)).map(|image| {
+            let [previous, now] = [image.from_ns, image.to_ns].map(|stamp_ns| lens_at(seconds_from_ns(stamp_ns)));
+            let track = |track: &RowTrack| RowTrack {
+                previous: observation(&previous, &track.previous),
+                now: observation(&now, &track.now),
+            };
+            ImageRotation {
+                second_from_first: so3::exp(&now.rotation(&so3::log(&image.second_from_first))),
+                tracks: image.tracks.iter().map(track).collect(),
+                ..image.clone()
+            }
         });
         first_rows(self.camera, &changed.collect::<Vec<_>>(), self.readout_s)
+    }
+
+    /// The data with at most about [`THINNED`] rotations, in blocks of consecutive images over the whole log.
+    pub(crate) fn thinned(&self) -> Self {
+        let thinning = self.measured.len().div_ceil(THINNED).max(1);
+        let blocks = self.measured.chunks(BLOCK).step_by(thinning);
+        let used_ns = blocks.flatten().map(|it| it.rotation.from_ns).collect();
+        let thinned = Self { used_ns: Some(used_ns), ..self.clone() };
+        let measured = self.measured.iter().filter(|it| thinned.is_used(&it.rotation)).cloned().collect();
+        Self { measured, ..thinned }
+    }
+
+    fn is_used(&self, rotation: &ImageRotation) -> bool {
+        let near = rotation.from_ns - SAME_NS..=rotation.from_ns + SAME_NS;
+        self.used_ns.as_ref().is_none_or(|used_ns| used_ns.range(near).next().is_some())
     }
 
     /// [`Self::with_lens`] for several lenses.
     pub(crate) fn with_lenses(&self, lenses: &[LensChange]) -> Vec<Vec<MeasuredRotation>> {
         lenses.par_iter().map(|lens| self.with_lens(lens)).collect()
+    }
+
+    /// Direction, −1 or 1, in which each joint moved last, at each sample of the joint angles: as by a gear with play, it changes
+    /// where the angle turns back by more than its noise.
+    fn directions(&self) -> Vec<Vec<f64>> {
+        let samples = &self.survey.joint_samples;
+        let joints = samples.first().map_or(0, |sample| sample.angles_rad.len());
+        let middle_ns = samples.get(samples.len() / 2).map_or(0, |sample| sample.stamp_ns);
+        let fitted = self.survey.fitted_angles_at(middle_ns);
+        let direction = |joint: usize| {
+            let sigma_rad =
+                fitted.as_ref().and_then(|fitted| fitted.get(joint)).map_or(0.0, |it| it.variance_rad2.sqrt());
+            let smallest_rad = (MOVING_SIGMAS * sigma_rad).max(MOVING_RAD);
+            let smooth = |place: usize| {
+                let near = &samples[place.saturating_sub(SMOOTHED)..(place + SMOOTHED + 1).min(samples.len())];
+                let around_rad = samples[place].angles_rad[joint];
+                let changes = near.iter().map(|sample| wrap_angle(sample.angles_rad[joint] - around_rad));
+                around_rad + changes.sum::<f64>() / near.len() as f64
+            };
+            let mut directions = vec![0.0; samples.len()];
+            let (mut direction, mut turned, mut unwrapped_rad) = (1.0, 0, 0.0);
+            let (mut farthest_rad, mut last_rad) = (f64::NEG_INFINITY, samples.first().map_or(0.0, |_| smooth(0)));
+            for place in 0..samples.len() {
+                let angle_rad = smooth(place);
+                unwrapped_rad += wrap_angle(angle_rad - last_rad);
+                last_rad = angle_rad;
+                let ahead_rad = direction * unwrapped_rad;
+                if ahead_rad > farthest_rad {
+                    (farthest_rad, turned) = (ahead_rad, place);
+                } else if farthest_rad - ahead_rad > smallest_rad {
+                    direction = -direction;
+                    directions[turned..place].fill(direction);
+                    (farthest_rad, turned) = (-ahead_rad, place);
+                }
+                directions[place] = direction;
+            }
+            directions
+        };
+        (0..joints).map(direction).collect()
     }
 
     /// Predictor with a fault undone; the rotations that it is used for must be measured with the lens of the fault.
@@ -104,7 +182,9 @@ impl<'a> RotationData<'a> {
             fault.corrects(Sensor::Imu).then(|| rates.changed(|rate| fault.angular_velocity(rate)))
         };
         let joints = joint_maps(fault, &self.rig.joint_names());
-        Predictor { data: self, chain, fault, joints, rates: fault.and_then(corrected) }
+        let has_play = joints.iter().any(|joint| joint.play_rad != 0.0);
+        let directions = if has_play { self.directions() } else { Vec::new() };
+        Predictor { data: self, chain, fault, joints, directions, rates: fault.and_then(corrected) }
     }
 }
 
@@ -114,6 +194,8 @@ pub(crate) struct Predictor<'a> {
     chain: &'a ClassicalChain,
     fault: Option<&'a Fault>,
     joints: Vec<JointMap>,
+    /// Directions of the joints at all samples; empty without play.
+    directions: Vec<Vec<f64>>,
     /// Corrected angular rates, `None` for those recorded.
     rates: Option<AngularRates>,
 }
@@ -121,12 +203,17 @@ pub(crate) struct Predictor<'a> {
 impl Predictor<'_> {
     /// A measured rotation with the data that predict it; `None` where these are missing.
     pub(crate) fn pair(&self, measured: &MeasuredRotation) -> Option<RotationPair> {
+        self.pair_at(measured, [0.0; 2])
+    }
+
+    /// [`Self::pair`] with seconds that are added to the stamps of the first and the second image.
+    pub(crate) fn pair_at(&self, measured: &MeasuredRotation, shifts_s: [f64; 2]) -> Option<RotationPair> {
         let rotation = &measured.rotation;
-        let corrected_ns = |stamp_ns: i64| {
+        let corrected_ns = |stamp_ns: i64, shift_s: f64| {
             let extra_s = self.fault.map_or(0.0, |fault| fault.camera_shift_s(seconds_from_ns(stamp_ns)));
-            stamp_ns + ns_from_seconds(self.data.camera.timeshift_cam_imu_s + self.data.delay_s + extra_s)
+            stamp_ns + ns_from_seconds(self.data.camera.timeshift_cam_imu_s + self.data.delay_s + extra_s + shift_s)
         };
-        let (from_ns, to_ns) = (corrected_ns(rotation.from_ns), corrected_ns(rotation.to_ns));
+        let (from_ns, to_ns) = (corrected_ns(rotation.from_ns, shifts_s[0]), corrected_ns(rotation.to_ns, shifts_s[1]));
         let [from_s, to_s] = [from_ns, to_ns].map(seconds_from_ns);
         let interval_s = to_s - from_s;
         let rates = self.rates.as_ref().unwrap_or(&self.data.imu_facts.gyroscope);
@@ -151,11 +238,16 @@ impl Predictor<'_> {
             return Some(Vec::new());
         }
         let shift_s = self.fault.map_or(0.0, Fault::joint_shift_s);
-        let readings = self.data.survey.fitted_angles_at(stamp_ns - ns_from_seconds(shift_s))?;
+        let at_ns = stamp_ns - ns_from_seconds(shift_s);
+        let readings = self.data.survey.fitted_angles_at(at_ns)?;
+        let place = self.data.survey.joint_samples.partition_point(|sample| sample.stamp_ns < at_ns);
+        let direction =
+            |joint: usize| self.directions.get(joint).and_then(|all| all.get(place)).copied().unwrap_or(0.0);
         let angle = |joint: &JointMap| {
             let reading = readings.get(joint.source)?;
             let variance_rad2 = reading.variance_rad2 * joint.scale * joint.scale;
-            let angle_rad = joint.scale * reading.angle_rad + joint.offset_rad;
+            let play_rad = joint.play_rad * direction(joint.source);
+            let angle_rad = joint.scale * reading.angle_rad + joint.offset_rad + play_rad;
             Some(FittedAngle { angle_rad, variance_rad2, ..*reading })
         };
         self.joints.iter().map(angle).collect()

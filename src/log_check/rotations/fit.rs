@@ -18,7 +18,7 @@ const NOISE_TOLERANCE: f64 = 2.0;
 const COMPARED_QUANTILE: f64 = 0.7;
 const COMPARED_SIGMAS: f64 = 0.5244;
 /// Degrees of freedom of the t distribution of a misfit: a wrong image rotation counts less than its square.
-const TAIL_DEGREES: f64 = 3.0;
+pub(crate) const TAIL_DEGREES: f64 = 3.0;
 /// Steps between 1 and [`NOISE_TOLERANCE`] of the noise levels over which a likelihood is averaged.
 const NOISE_STEPS: u32 = 10;
 /// Prior standard deviation of an orientation that may be any.
@@ -110,6 +110,8 @@ pub(crate) struct RotationFit {
     pub(crate) extra: Vec<f64>,
     /// −2 times the logarithm of the likelihood of the misfits by a t distribution, without constants.
     pub(crate) deviance: f64,
+    /// Sum of the squares of orientation and chain parameters in units of their prior standard deviations.
+    pub(crate) prior_square: f64,
 }
 
 impl RotationPair {
@@ -288,6 +290,12 @@ impl FitProblem {
         differences
     }
 
+    fn prior_square(&self, at: &FitEstimate) -> f64 {
+        let squares = self.prior_information.component_mul(&Self::differences(at).map(|value| value * value));
+        let chain = CHAIN..squares.len() - self.extra;
+        squares.rows(0, BIAS).sum() + squares.rows(chain.start, chain.len()).sum()
+    }
+
     /// Result at the solution; `None` if the rotations do not constrain it.
     fn finish(&self, at: &FitEstimate, spread: f64) -> Option<RotationFit> {
         let rows = &self.rows;
@@ -310,6 +318,7 @@ impl FitProblem {
             mean_square,
             degrees_of_freedom,
             extra,
+            prior_square: self.prior_square(at),
             deviance: deviance(&squares) + rows.iter().map(|row| row.log_noise_ratio).sum::<f64>(),
         })
     }

@@ -73,7 +73,7 @@ fn the_imu_measures_with_its_scales_and_axes_and_drifts() {
     let wrong = SyntheticOptions {
         imu_intrinsics_error: [0.01, 0.02],
         accelerometer_drift: Some([0.02, 3.0]),
-        intrinsics_error: LensChange { focal: 1.01, centre: [0.0055, -0.0028] },
+        intrinsics_error: LensChange { focal: 1.01, centre: [0.0055, -0.0028], ..LensChange::NONE },
         ..plain.clone()
     };
     let (plain, wrong) = (synthetic_tracks(&plain), synthetic_tracks(&wrong));

@@ -10,6 +10,9 @@ use crate::sensors::CameraMount;
 /// Number of times at which a change is tried.
 const TIMES: usize = 12;
 
+/// Smallest range of a joint that moves, in radians: in a smaller unit the readings would not move the camera.
+const MIN_RANGE_RAD: f64 = 0.05;
+
 /// Hypotheses about intrinsics that do not change, from an approximate ratio of the focal length to the rig's.
 pub(super) fn intrinsics(focal: f64) -> Vec<Hypothesis> {
     vec![
@@ -17,6 +20,11 @@ pub(super) fn intrinsics(focal: f64) -> Vec<Hypothesis> {
         Hypothesis::new(vec![Fault::new(FaultKind::PrincipalPoint, &[0.0; 2])], 2),
         Hypothesis::new(vec![Fault::new(FaultKind::Intrinsics, &[focal, 0.0, 0.0])], 3),
     ]
+}
+
+/// Hypothesis about a distortion that the rig lacks.
+pub(super) fn radial() -> Hypothesis {
+    Hypothesis::new(vec![Fault::new(FaultKind::Radial, &[0.0])], 1)
 }
 
 /// Hypotheses for a camera on a chain, but for those about its intrinsics; a chain without joints is that of a rigid
@@ -50,8 +58,11 @@ pub(super) fn candidates(data: &RotationData<'_>, chain: &ClassicalChain) -> Vec
     };
     all.push(Hypothesis::new(permutations(names.len()).into_iter().skip(1).map(swapped).collect(), 0));
     let in_unit = |unit: JointUnit| Fault::new(FaultKind::JointScale, &[unit.size_rad()]);
-    all.push(Hypothesis::new(JointUnit::all().map(in_unit).collect(), 0));
+    let range = largest_range(data);
+    let moves = |unit: &JointUnit| range * unit.size_rad() > MIN_RANGE_RAD;
+    all.push(Hypothesis::new(JointUnit::all().filter(moves).map(in_unit).collect(), 0));
     for name in &names {
+        all.push(fitted(FaultKind::JointPlay, &[name], 1));
         all.push(fitted(FaultKind::JointScale, &[name], 1));
         // With any orientation of the camera, an offset of the last joint would be unobservable.
         all.push(fitted(FaultKind::JointOffset, &[name], 1).with_orientation_of_rig());
@@ -59,6 +70,17 @@ pub(super) fn candidates(data: &RotationData<'_>, chain: &ClassicalChain) -> Vec
         all.push(Hypothesis::new(vec![jump], 1).since_one_of(times_s(data)));
     }
     all
+}
+
+/// Largest range of the readings of a joint, in their unit.
+fn largest_range(data: &RotationData<'_>) -> f64 {
+    let samples = &data.survey.joint_samples;
+    let joints = samples.first().map_or(0, |sample| sample.angles_rad.len());
+    let range = |joint: usize| {
+        let readings = || samples.iter().map(|sample| sample.angles_rad[joint]);
+        readings().fold(f64::NEG_INFINITY, f64::max) - readings().fold(f64::INFINITY, f64::min)
+    };
+    (0..joints).map(range).fold(0.0, f64::max)
 }
 
 /// Pairs of places whose exchange, one after the other, puts the entry `sources[i]` to place `i`.

@@ -26,6 +26,8 @@ const ITERATIONS: usize = 8;
 /// it ends.
 const FOCAL_RANGE: f64 = 0.06;
 const FOCAL_PRECISION: f64 = 1e-3;
+/// Range of the coefficients of a radial distortion that is searched, to a hundredth of its length.
+const RADIAL_RANGE: [f64; 2] = [-0.6, 0.6];
 /// Change of all parameters, in units of their steps, at which the iterations end.
 const CONVERGED: f64 = 0.05;
 /// Number of starts from which a hypothesis is fitted until it converges: the best after one iteration.
@@ -113,7 +115,7 @@ pub(super) struct Fitter<'a> {
     /// With any orientation of the camera.
     priors: FitPriors,
     /// Smallest error of the orientation that counts as one, in radians: [`ORIENTATION_SIGMAS`] standard deviations.
-    orientation_tolerance_rad: f64,
+    pub(super) orientation_tolerance_rad: f64,
     /// Rotations of the images as recorded.
     pub(super) measured: Vec<MeasuredRotation>,
 }
@@ -176,14 +178,22 @@ impl<'a> Fitter<'a> {
         let mut tried: Vec<(f64, Fault)> = starts.filter_map(tried).collect();
         tried.sort_by(|a, b| a.0.total_cmp(&b.0));
         let fits = tried.into_iter().take(FOLLOWED).filter_map(|(_, start)| self.converged(start, fitted, &priors));
+        let fits = fits.filter(|found| found.fault.is_possible());
         fits.min_by(|one, other| one.criterion.total_cmp(&other.criterion))
     }
 
     /// Iterates corrections of the data and linear fits until the values no longer change.
     fn converged(&self, start: Fault, fitted: usize, priors: &FitPriors) -> Option<Fitted> {
-        let is_focal = start.kind == FaultKind::Focal;
-        let mut fault = if is_focal { self.best_focal(&start) } else { start };
-        let iterations = if is_focal || fitted == 0 { 0 } else { ITERATIONS };
+        let mut fault = match start.kind {
+            FaultKind::Focal => {
+                let focal = start.value(0);
+                self.best_value(&start, [-FOCAL_RANGE, FOCAL_RANGE], |logarithm| focal * logarithm.exp())
+            }
+            FaultKind::Radial => self.best_value(&start, RADIAL_RANGE, |value| value),
+            _ => start,
+        };
+        let is_searched = matches!(fault.kind, FaultKind::Focal | FaultKind::Radial);
+        let iterations = if is_searched || fitted == 0 { 0 } else { ITERATIONS };
         for _ in 0..iterations {
             let changes = self.linear_fit(Some(&fault), fitted, priors)?.extra;
             let mut largest_ratio: f64 = 0.0;
@@ -196,24 +206,34 @@ impl<'a> Fitter<'a> {
                 break;
             }
         }
-        // What is reported is the misfit of corrected data, not that of a linear model of the correction.
+        self.evaluated(fault, fitted, priors)
+    }
+
+    /// Fit with a fault whose values are known. What is reported is the misfit of corrected data, not that of a linear model
+    /// of the correction.
+    fn evaluated(&self, fault: Fault, fitted: usize, priors: &FitPriors) -> Option<Fitted> {
         let fit = self.linear_fit(Some(&fault), 0, priors)?;
         let criterion = self.criterion(&fit, fitted + usize::from(fault.since_s.is_some()));
         Some(Fitted { fault, fit, criterion })
     }
 
-    /// Fault with the focal length near the start that has the largest likelihood, by golden section: every focal length
-    /// has other measured rotations, and other wrong ones among them.
-    fn best_focal(&self, start: &Fault) -> Fault {
-        let at = |logarithm: f64| Fault::new(start.kind, &[start.value(0) * logarithm.exp()]);
-        let deviance = |logarithm: f64| {
-            self.linear_fit(Some(&at(logarithm)), 0, &self.priors).map_or(f64::INFINITY, |fit| fit.deviance)
-        };
+    /// Best fit of a hypothesis about the lens, whose values are fitted to the rotations of `few`, which are some of these.
+    pub(super) fn best_lens(&self, hypothesis: Hypothesis, few: &Fitter<'_>) -> Option<Fitted> {
+        let fitted = hypothesis.fitted;
+        self.evaluated(few.best(hypothesis)?.fault, fitted, &self.priors)
+    }
+
+    /// Fault with the value in a range that has the largest likelihood, by golden section: every lens has other measured
+    /// rotations, and other wrong ones among them. `value` computes the value from a place in the range.
+    fn best_value(&self, start: &Fault, [mut low, mut high]: [f64; 2], value: impl Fn(f64) -> f64) -> Fault {
+        let at = |place: f64| Fault::new(start.kind, &[value(place)]);
+        let deviance =
+            |place: f64| self.linear_fit(Some(&at(place)), 0, &self.priors).map_or(f64::INFINITY, |fit| fit.deviance);
         let ratio = 0.5 * (5.0_f64.sqrt() - 1.0);
-        let (mut low, mut high) = (-FOCAL_RANGE, FOCAL_RANGE);
+        let precision = FOCAL_PRECISION * ((high - low) / (2.0 * FOCAL_RANGE));
         let (mut left, mut right) = (high - ratio * (high - low), low + ratio * (high - low));
         let (mut at_left, mut at_right) = (deviance(left), deviance(right));
-        while high - low > FOCAL_PRECISION {
+        while high - low > precision {
             if at_left < at_right {
                 (high, right, at_right) = (right, left, at_left);
                 left = high - ratio * (high - low);
@@ -271,6 +291,16 @@ impl<'a> Fitter<'a> {
             extend(None, f64::NEG_INFINITY, split_s);
         }
         pairs
+    }
+
+    /// Rotations with intrinsics that depend on the stamp of an image, in seconds since the log began.
+    pub(super) fn with_lens_at(&self, lens_at: impl Fn(f64) -> LensChange) -> Vec<MeasuredRotation> {
+        joined(&self.data.with_lens_at(lens_at), length_s(self.chain))
+    }
+
+    /// Fit of pairs without a correction.
+    pub(super) fn fit_pairs(&self, pairs: &[RotationPair]) -> Option<RotationFit> {
+        if pairs.len() < MIN_ROTATIONS { None } else { RotationFit::of(pairs, self.chain, &self.priors) }
     }
 
     /// Fit of rotations as measured with another lens each, and their predictions in the frame of the measured rotations

@@ -8,12 +8,15 @@
 mod candidates;
 mod fit;
 mod focal_grid;
+mod focal_period;
+mod image_order;
 
 use rayon::prelude::*;
 
-use self::candidates::{candidates, intrinsics};
+use self::candidates::{candidates, intrinsics, radial};
 use self::fit::{Fitted, Fitter, Hypothesis, length_s};
 use self::focal_grid::FocalGrid;
+use self::focal_period::LinearModels;
 use super::data::RotationData;
 use super::fit::RotationFit;
 use crate::faults::{Explanation as _, Fault, FaultKind, MOST_REMAINING, Sentence, Subject};
@@ -68,6 +71,8 @@ pub(in crate::log_check) fn explain(
     let Some(mut comparison) = Comparison::new(data, chain, orientation_tolerance_rad) else {
         return Outcome::Open(Vec::new());
     };
+    comparison.fitted.extend(image_order::fit(&comparison.fitter));
+    Fitted::sort(&mut comparison.fitted);
     comparison.add_intrinsics();
     comparison.explanation()
 }
@@ -162,8 +167,8 @@ impl<'a> Comparison<'a> {
         self.fitter.criterion(&self.given, 0)
     }
 
-    /// Adds the hypotheses about intrinsics unless another one explains the misfit: other intrinsics need all rotations
-    /// measured again; only a wrong scale of the gyroscope resembles them.
+    /// Adds the hypotheses about intrinsics unless another one explains the misfit or none of them can: other intrinsics need
+    /// all rotations measured again; only a wrong scale of the gyroscope resembles them.
     fn add_intrinsics(&mut self) {
         let found = |it: &Fitted| {
             it.fit.is_explained()
@@ -174,9 +179,20 @@ impl<'a> Comparison<'a> {
         if self.fitted.iter().any(found) {
             return;
         }
-        let grid = FocalGrid::new(&self.fitter);
-        self.add(intrinsics(grid.best_constant()));
-        self.fitted.extend(grid.pieces_fit(&self.fitter));
+        let Some(models) = LinearModels::new(&self.fitter, &self.fitter.measured) else { return };
+        let few = self.data.thinned();
+        let few = Fitter::new(&few, self.fitter.chain, self.fitter.orientation_tolerance_rad);
+        let grid = FocalGrid::new(&few);
+        let mut lenses = intrinsics(grid.best_constant());
+        lenses.push(radial());
+        let fitted: Vec<Fitted> = lenses.into_par_iter().filter_map(|lens| self.fitter.best_lens(lens, &few)).collect();
+        self.fitted.extend(fitted);
+        // Pieces of the few rotations tell whether all are worth the time.
+        let given = few.fit_given().map_or(f64::NEG_INFINITY, |given| few.criterion(&given, 0));
+        if grid.pieces_fit(&few).is_some_and(|pieces| pieces.criterion + DECISIVE < given) {
+            self.fitted.extend(FocalGrid::new(&self.fitter).pieces_fit(&self.fitter));
+        }
+        self.fitted.extend(models.period_fit(&self.fitter));
         Fitted::sort(&mut self.fitted);
     }
 
@@ -202,7 +218,8 @@ impl<'a> Comparison<'a> {
         let preferred = Fitted::preferred(fitted, DECISIVE, |it| it.fit.is_explained());
         let Some(best) = fitted.get(preferred) else { return Outcome::Open(Vec::new()) };
         let is_alone = best.rivals(fitted, DECISIVE).next().is_none();
-        if best.fit.is_explained() && is_alone && best.criterion + DECISIVE < self.criterion_given() {
+        let is_less = |found: &Fitted| found.fit.misfit_rad < given.misfit_rad;
+        if best.fit.is_explained() && is_less(best) && is_alone && best.criterion + DECISIVE < self.criterion_given() {
             let (cause, evidence) = self.describe(best);
             return Outcome::Decisive(Box::new(cause), evidence);
         }
@@ -215,6 +232,7 @@ impl<'a> Comparison<'a> {
             let (cause, evidence) = self.describe(found);
             if remains
                 && improves
+                && is_less(found)
                 && open.len() < MOST_REMAINING
                 && open.iter().all(|(listed, _)| listed.sentence.statement != cause.sentence.statement)
             {
