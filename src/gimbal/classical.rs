@@ -48,6 +48,23 @@ impl ClassicalChain {
         self.links.len()
     }
 
+    /// The chain whose links have the values of this one by the modified convention (Craig, "Introduction to Robotics", 2005,
+    /// Eq. 3.6): a link begins with `a` along and `α` about the x axis, then turns about its joint.
+    #[must_use]
+    pub fn read_as_modified(&self) -> Self {
+        let along_x = |link: &DhLink| {
+            let rotation = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), link.alpha_rad);
+            RigidTransform::new(rotation, Vector3::new(link.a_m, 0.0, 0.0))
+        };
+        let imu_from_base = self.links.first().map_or(self.imu_from_base, |first| self.imu_from_base * along_x(first));
+        let next = |number: usize| self.links.get(number + 1).map_or((0.0, 0.0), |link| (link.a_m, link.alpha_rad));
+        let link = |(number, link): (usize, &DhLink)| {
+            let (a_m, alpha_rad) = next(number);
+            DhLink { a_m, alpha_rad, ..*link }
+        };
+        Self { imu_from_base, links: self.links.iter().enumerate().map(link).collect(), ..self.clone() }
+    }
+
     /// Returns `imu_from_camera` at the given encoder angles, one per joint (Eqs. 5–6).
     ///
     /// # Panics

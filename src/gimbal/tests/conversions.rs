@@ -1,6 +1,6 @@
 use std::f64::consts::FRAC_PI_2;
 
-use nalgebra::DVector;
+use nalgebra::{DVector, UnitQuaternion, Vector3};
 
 use super::random::{Random, all_chains, special_chains};
 use crate::geometry::RigidTransform;
@@ -12,6 +12,25 @@ use crate::text::Named as _;
 
 fn distance(a: &RigidTransform, b: &RigidTransform) -> f64 {
     (a.to_matrix() - b.to_matrix()).amax()
+}
+
+#[test]
+fn links_are_read_by_the_modified_convention() {
+    let mut random = Random::new(4);
+    let chain = random.chain(3);
+    let angles = random.angles(3);
+    let transform = |rotation: UnitQuaternion<f64>, translation| RigidTransform::new(rotation, translation);
+    let link = |link: &DhLink, angle: f64| {
+        let x = transform(
+            UnitQuaternion::from_axis_angle(&Vector3::x_axis(), link.alpha_rad),
+            Vector3::new(link.a_m, 0.0, 0.0),
+        );
+        let turned = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle + link.theta_offset_rad);
+        x * transform(turned, Vector3::new(0.0, 0.0, link.d_m))
+    };
+    let links = chain.links.iter().zip(&angles).map(|(of, angle)| link(of, *angle));
+    let expected = links.fold(chain.imu_from_base, |all, next| all * next) * chain.effector_from_camera;
+    assert!(distance(&chain.read_as_modified().imu_from_camera(&angles), &expected) < 1e-13);
 }
 
 #[test]

@@ -12,6 +12,7 @@ use crate::log_check::clock_alignment::{
     ClockAlignment, OFFSET_TOLERANCE_S, ORIENTATION_TOLERANCE_RAD, RotationReference, SCALE_SIGMA, SCALE_TOLERANCE,
     align_clocks,
 };
+use crate::log_check::report::verdict::MOST_LIKELY;
 use crate::log_check::report::{Area, Findings, ImageRotation, Measurement, Severity};
 use crate::log_check::rotations::data::{JOINED_S, RotationData, joined};
 use crate::log_check::rotations::fit::{FREE_ORIENTATION_RAD, FitPriors, RotationFit, RotationPair};
@@ -35,8 +36,14 @@ const WRONG_ROTATION_RAD: f64 = 0.35;
 /// Smallest ratio of the second singular value to the first; below it all rotations are about one axis, and the rotation
 /// about that axis is unobservable.
 const MIN_SPREAD: f64 = 0.02;
-/// Largest ratio of the misfit with an inverted transform to the misfit as in the rig with which it counts as inverted.
-const INVERTED_MISFIT: f64 = 0.5;
+/// Largest ratio of the misfit by another convention to the misfit as in the rig with which the rig has that convention.
+const OTHER_MISFIT: f64 = 0.5;
+/// Prior standard deviation of the time offset where chains are compared within their bounds.
+const BOUND_OFFSET_S: f64 = 0.01;
+/// Decrease of −2·ln of the likelihood by which another convention is decisive.
+const DECISIVE: f64 = 12.0;
+/// Largest ratio of the squared corrections that the chain of another convention needs to those of the rig's chain.
+const SMALLER_CHANGE: f64 = 0.25;
 
 const CALIBRATE: &str =
     "check direction and axes of the extrinsics (T_cam_imu maps from the IMU to the camera), or calibrate";
@@ -45,6 +52,17 @@ const CALIBRATE: &str =
 struct HandEye<'a> {
     data: RotationData<'a>,
     camera: &'a CameraRig,
+}
+
+/// Chain by another convention than the rig's.
+struct OtherChain {
+    chain: ClassicalChain,
+    title: String,
+    remedy: String,
+    /// Median difference of predicted and measured rotations, in radians.
+    misfit_rad: f64,
+    /// False if only the size of the corrections that the rig's chain would need speaks for it.
+    is_certain: bool,
 }
 
 /// Consequence of a comparison for other checks.
@@ -200,13 +218,13 @@ impl HandEye<'_> {
             fit.scale,
             fit.spread * 100.0
         );
-        if let Some((field, misfit)) = self.inverted(chain, offset_s, given_rad) {
-            let title = format!("{field} is inverted, according to the rotations of {key}");
-            let evidence = format!("{evidence}; by {:.3}° with {field} inverted", misfit.to_degrees());
-            let remedy = format!(
-                "write the inverse of {field}: T_a_b maps points from b to a (Kalibr: T_cam_imu from the IMU to the camera)"
-            );
-            findings.add(Severity::Error, Area::Extrinsics, title, evidence, remedy);
+        if let Some(other) = self.other_chain(chain, offset_s, given_rad) {
+            let OtherChain { title, remedy, misfit_rad, is_certain, .. } = other;
+            let (severity, likely) = if is_certain { (Severity::Error, "") } else { (Severity::Warning, MOST_LIKELY) };
+            let title = format!("{likely}{title}, according to the rotations of {key}");
+            let evidence = format!("{evidence}; by {:.3}° with this corrected", misfit_rad.to_degrees());
+            findings.add(severity, Area::Extrinsics, title, evidence, remedy);
+            findings.state_faults([Fault::from(FaultKind::Chain).of_camera(key)]);
             return HandEyeOutcome::Other;
         }
         let Some(found) = within_noise else {
@@ -275,30 +293,78 @@ impl HandEye<'_> {
         findings.state_faults(causes.iter().filter_map(|cause| cause.fault.clone()).chain([fault]));
     }
 
-    /// Transform of the rig whose inverse predicts the rotations much better, up to an error within tolerance, with the
-    /// misfit in radians.
-    fn inverted(&self, chain: &ClassicalChain, offset_s: f64, given_rad: f64) -> Option<(String, f64)> {
-        let key = &self.camera.key;
-        let base = ClassicalChain { imu_from_base: chain.imu_from_base.inverse(), ..chain.clone() };
-        let candidates = if self.camera.mount == CameraMount::Gimbal {
-            let end = ClassicalChain { effector_from_camera: chain.effector_from_camera.inverse(), ..chain.clone() };
-            let both = ClassicalChain { effector_from_camera: end.effector_from_camera, ..base.clone() };
-            vec![
-                ("gimbal.T_E_C".to_owned(), end),
-                ("gimbal.T_I_B".to_owned(), base),
-                ("each of gimbal.T_I_B and gimbal.T_E_C".to_owned(), both),
-            ]
-        } else {
-            vec![(format!("{key}.T_cam_imu"), base)]
-        };
-        let misfits = candidates.into_iter().filter_map(|(field, chain)| {
-            let pairs = self.pairs(&chain, offset_s, 0.0);
-            let vectors: Vec<_> = pairs.iter().map(|pair| (pair.predicted(&chain), pair.measured)).collect();
+    /// Chain of another convention that predicts the rotations much better than the rig's, with an orientation of the camera
+    /// within tolerance; or, of a gimbal, one that explains them within the bounds of the rig, which the rig's does not.
+    fn other_chain(&self, chain: &ClassicalChain, offset_s: f64, given_rad: f64) -> Option<OtherChain> {
+        let candidates = self.other_chains(chain);
+        let misfit = |candidate: &OtherChain| {
+            let pairs = self.pairs(&candidate.chain, offset_s, 0.0);
+            let vectors: Vec<_> = pairs.iter().map(|pair| (pair.predicted(&candidate.chain), pair.measured)).collect();
             let (error, _) = best_rotation(&vectors)?;
-            let misfit = misfit_rad(&pairs, &chain);
-            (error.angle() < ORIENTATION_TOLERANCE_RAD).then_some((field, misfit))
+            Some((error.angle() < ORIENTATION_TOLERANCE_RAD, misfit_rad(&pairs, &candidate.chain)))
+        };
+        let measured = candidates.into_iter().filter_map(|candidate| {
+            let (is_near, misfit_rad) = misfit(&candidate)?;
+            is_near.then_some(OtherChain { misfit_rad, ..candidate })
         });
-        misfits.filter(|(_, misfit)| *misfit < INVERTED_MISFIT * given_rad).min_by(|a, b| a.1.total_cmp(&b.1))
+        let mut measured: Vec<OtherChain> = measured.collect();
+        measured.sort_by(|one, other| one.misfit_rad.total_cmp(&other.misfit_rad));
+        let is_clear = |best: &OtherChain| best.misfit_rad < OTHER_MISFIT * given_rad;
+        if measured.first().is_some_and(is_clear) || self.camera.mount != CameraMount::Gimbal {
+            return measured.into_iter().next().filter(is_clear);
+        }
+        let bound_rad = self.data.chain_sigma_rad();
+        let priors = FitPriors {
+            orientation_rad: bound_rad,
+            time_offset_s: BOUND_OFFSET_S,
+            scale: SCALE_SIGMA,
+            chain: bound_rad,
+        };
+        let fit = |chain: &ClassicalChain| RotationFit::of(&self.pairs(chain, offset_s, JOINED_S), chain, &priors);
+        let given = fit(chain)?;
+        let fits = measured.into_iter().filter_map(|candidate| Some((fit(&candidate.chain)?, candidate)));
+        let is_better = |(found, _): &(RotationFit, OtherChain)| {
+            found.is_explained()
+                && found.deviance + found.prior_square + DECISIVE < given.deviance + given.prior_square
+                && found.prior_square < SMALLER_CHANGE * given.prior_square
+        };
+        let cost = |found: &RotationFit| found.deviance + found.prior_square;
+        let best = fits.filter(is_better).min_by(|one, other| cost(&one.0).total_cmp(&cost(&other.0)));
+        best.map(|(_, candidate)| OtherChain { is_certain: false, ..candidate })
+    }
+
+    /// Chains by other conventions than the rig's.
+    fn other_chains(&self, chain: &ClassicalChain) -> Vec<OtherChain> {
+        let inverted = |field: &str, chain: ClassicalChain| OtherChain {
+            title: format!("{field} is inverted"),
+            remedy: format!(
+                "write the inverse of {field}: T_a_b maps points from b to a (Kalibr: T_cam_imu from the IMU to the camera)"
+            ),
+            chain,
+            misfit_rad: f64::INFINITY,
+            is_certain: true,
+        };
+        let base = ClassicalChain { imu_from_base: chain.imu_from_base.inverse(), ..chain.clone() };
+        if self.camera.mount != CameraMount::Gimbal {
+            return vec![inverted(&format!("{}.T_cam_imu", self.camera.key), base)];
+        }
+        let end = ClassicalChain { effector_from_camera: chain.effector_from_camera.inverse(), ..chain.clone() };
+        let both = ClassicalChain { effector_from_camera: end.effector_from_camera, ..base.clone() };
+        vec![
+            inverted("gimbal.T_E_C", end),
+            inverted("gimbal.T_I_B", base),
+            inverted("each of gimbal.T_I_B and gimbal.T_E_C", both),
+            OtherChain {
+                title: "gimbal.links follow the modified convention of Denavit and Hartenberg (Craig)".to_owned(),
+                remedy:
+                    "move a and alpha of each link to the link before it: in the rig they follow the rotation and the \
+                         translation about the joint's axis (classical convention)"
+                        .to_owned(),
+                chain: chain.read_as_modified(),
+                misfit_rad: f64::INFINITY,
+                is_certain: true,
+            },
+        ]
     }
 }
 

@@ -17,6 +17,10 @@ struct Images {
     mount: fn(f64) -> Vector3<f64>,
     /// Ratio of the focal length to the rig's at a time in seconds.
     focal: fn(f64) -> f64,
+    /// Coefficient of the division model of a distortion that the rig lacks.
+    radial: f64,
+    /// Seconds from the stamp of the image with a number to its exposure.
+    exposed_s: fn(i64) -> f64,
     /// Rotation of the IMU from its rotation vector, as if its driver changed the axes the other way.
     of_imu: fn(Vector3<f64>) -> Vector3<f64>,
     /// Angle of the joint on which the camera is, in radians at a time in seconds; `None` for a rigid camera.
@@ -25,7 +29,15 @@ struct Images {
 
 impl Default for Images {
     fn default() -> Self {
-        Self { late_s: 0.0, mount: |_| Vector3::zeros(), focal: |_| 1.0, of_imu: |vector| vector, joint: None }
+        Self {
+            late_s: 0.0,
+            mount: |_| Vector3::zeros(),
+            focal: |_| 1.0,
+            radial: 0.0,
+            exposed_s: |_| 0.0,
+            of_imu: |vector| vector,
+            joint: None,
+        }
     }
 }
 
@@ -39,9 +51,10 @@ fn joint_at(time_s: f64) -> f64 {
     0.7 * (0.9 * time_s).sin()
 }
 
-/// Rotation `second_from_first` of the IMU over 50 ms.
-fn imu_rotation(from_s: f64) -> UnitQuaternion<f64> {
-    let step = |step: i32| so3::exp(&(rate_at(from_s + (f64::from(step) + 0.5) * 1e-4) * 1e-4));
+/// Rotation `second_from_first` of the IMU between two times in any order.
+fn imu_rotation(from_s: f64, to_s: f64) -> UnitQuaternion<f64> {
+    let length_s = (to_s - from_s) / 500.0;
+    let step = |step: i32| so3::exp(&(rate_at(from_s + (f64::from(step) + 0.5) * length_s) * length_s));
     (0..500).map(step).fold(UnitQuaternion::identity(), |all, next| all * next).inverse()
 }
 
@@ -59,12 +72,14 @@ impl Images {
         };
         let rotation = |number: i64| {
             let from_s = number as f64 * 0.05;
-            let imu = so3::exp(&(self.of_imu)(so3::log(&imu_rotation(from_s + self.late_s))));
+            let exposed = |number: i64| number as f64 * 0.05 + self.late_s + (self.exposed_s)(number);
+            let of_imu = imu_rotation(exposed(number), exposed(number + 1));
+            let imu = so3::exp(&(self.of_imu)(so3::log(&of_imu)));
             // The mount does not move within a pair.
             let to = chain_at(from_s + 0.05);
             let from = if (self.mount)(from_s) == (self.mount)(from_s + 0.05) { chain_at(from_s) } else { to };
             let second_from_first = to * imu * from.inverse();
-            let focal = (self.focal)(from_s);
+            let [focal, next] = [from_s, from_s + 0.05].map(self.focal);
             let vector = so3::log(&second_from_first);
             let from_ns = number * 50 * MS;
             ImageRotation {
@@ -72,7 +87,7 @@ impl Images {
                 from_ns,
                 to_ns: from_ns + 50 * MS,
                 second_from_first: so3::exp(&Vector3::new(vector.x * focal, vector.y * focal, vector.z)),
-                tracks: tracks(&second_from_first, focal, &mut noise),
+                tracks: tracks(&second_from_first, [focal, next], self.radial, &mut noise),
             }
         };
         (60..200).map(rotation).collect()
@@ -83,19 +98,25 @@ impl Images {
     }
 }
 
-/// Features of two images between which the camera rotates, with noise of 0.1 px, by a focal length that is this ratio of
-/// the rig's.
-fn tracks(second_from_first: &UnitQuaternion<f64>, focal: f64, noise: &mut Noise) -> Vec<RowTrack> {
-    let observation = |bearing: Vector3<f64>| {
-        let by_rig = Vector3::new(focal * bearing.x, focal * bearing.y, bearing.z);
-        RowObservation { bearing: by_rig.normalize(), row: 0.5 }
+/// Features of two images between which the camera rotates, with noise of 0.1 px, by focal lengths that are these ratios of
+/// the rig's and a distortion that the rig lacks.
+fn tracks(second_from_first: &UnitQuaternion<f64>, focal: [f64; 2], radial: f64, noise: &mut Noise) -> Vec<RowTrack> {
+    let observation = |bearing: Vector3<f64>, focal: f64| {
+        let [x, y] = [bearing.x / bearing.z, bearing.y / bearing.z];
+        // From x = x' / (1 + λ r'²) follows r' by iteration.
+        let (size, mut distorted) = (x.hypot(y), x.hypot(y));
+        for _ in 0..20 {
+            distorted = size * (1.0 + radial * distorted * distorted);
+        }
+        let ratio = focal * if size > 0.0 { distorted / size } else { 1.0 };
+        RowObservation { bearing: Vector3::new(ratio * x, ratio * y, 1.0).normalize(), row: 0.5 }
     };
     (0..60)
         .map(|_| {
             let point = 0.3 * noise.vector();
             let bearing = Vector3::new(point.x, point.y, 1.0).normalize();
             let now = second_from_first * bearing + 0.1 / 80.0 * noise.vector();
-            RowTrack { previous: observation(bearing), now: observation(now) }
+            RowTrack { previous: observation(bearing, focal[0]), now: observation(now, focal[1]) }
         })
         .collect()
 }
@@ -160,6 +181,25 @@ fn a_wrong_focal_length_is_named_with_its_value_and_its_time() {
 }
 
 #[test]
+fn a_focal_length_that_varies_and_a_missing_distortion_are_named() {
+    let hunting = |time_s: f64| 1.0 + 0.35 * (TAU * time_s / 2.5).sin();
+    let report = Images { focal: hunting, ..Images::default() }.check(&Flight::default());
+    expect(&report, Severity::Error, &["the focal length of cam0 varies by ±3", "with a period of 2.5 s"]);
+    let report = Images { radial: -0.3, ..Images::default() }.check(&Flight::default());
+    expect(&report, Severity::Error, &["a radial distortion that the rig lacks, k1 of about -0.29"]);
+}
+
+#[test]
+fn images_in_another_order_than_their_stamps_are_named() {
+    let of = |exposed_s: fn(i64) -> f64| Images { exposed_s, ..Images::default() }.check(&Flight::default());
+    // Decoding order: the third image of each cycle comes first.
+    let decoded = of(|number| if number % 3 == 0 { 0.1 } else { -0.05 });
+    expect(&decoded, Severity::Error, &["images of cam0 are not in the order of their stamps: in cycles of 3"]);
+    let alternating = of(|number| if number % 2 == 0 { 0.012 } else { -0.012 });
+    expect(&alternating, Severity::Error, &["the stamps of cam0 are wrong in a cycle of 2 images", "12"]);
+}
+
+#[test]
 fn a_mount_that_moves_is_named_with_its_time() {
     let images = Images {
         mount: |time_s| if time_s < 6.5 { Vector3::zeros() } else { Vector3::new(0.0, 0.2, 0.1) },
@@ -184,6 +224,30 @@ fn faults_of_a_joint_are_named() {
     );
     let halved = of(|time_s| 2.0 * joint_at(time_s));
     expect(&halved, Severity::Error, &["readings of joint 'yaw' are 0.5", "gear ratio"]);
+}
+
+#[test]
+fn the_play_of_a_joint_is_named() {
+    fn fast_at(time_s: f64) -> f64 {
+        0.4 * (4.0 * time_s).sin()
+    }
+    let play = |ms: i64, angle: &mut f64| {
+        let time_s = ms as f64 * 1e-3;
+        let noise_rad = *angle - joint_at(time_s);
+        *angle = fast_at(time_s) + noise_rad + if (4.0 * time_s).cos() > 0.0 { 0.06 } else { -0.06 };
+    };
+    let images = Images { joint: Some(fast_at), ..Images::default() };
+    let report = images.check(&Flight { joint: play, ..on_gimbal() });
+    expect(&report, Severity::Warning, &["the reading of joint 'yaw' depends on its direction of motion: play of 6."]);
+}
+
+#[test]
+fn joint_angles_that_are_held_are_named() {
+    let held = |ms: i64, angle: &mut f64| *angle = joint_at((ms - ms % 100) as f64 * 1e-3);
+    let images = Images { joint: Some(joint_at), ..Images::default() };
+    let report = images.check(&Flight { joint: held, ..on_gimbal() });
+    expect(&report, Severity::Warning, &["the joint angles hold their values: 10.", "in messages at 50 Hz"]);
+    expect(&report, Severity::Note, &["the rotations of cam0 are not compared"]);
 }
 
 #[test]
