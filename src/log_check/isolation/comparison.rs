@@ -32,6 +32,10 @@ const REMAINING_PART: f64 = 0.1;
 /// Length of the bins of a misfit over time, in seconds, and their largest number.
 const BIN_S: f64 = 1.0;
 const MOST_BINS: f64 = 120.0;
+/// Bins beside an interval that agree and their smallest signal, as a ratio of the signal inside: they show that the interval
+/// ends there.
+const MIN_SOUND: usize = 2;
+const SHOWING_RATIO: f64 = 0.5;
 
 /// Parameter of a difference between two sources.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,6 +48,8 @@ pub(super) enum Parameter {
     Delay,
     /// Ratio of the first source to the second one, less one.
     Scale,
+    /// The same for each axis of the second source.
+    AxisScales,
     /// Specific force of a body at rest in the world, in m/s².
     Gravity,
     /// Bias of the specific forces in m/s².
@@ -60,7 +66,7 @@ impl Parameter {
     pub(super) fn width(self) -> usize {
         match self {
             Self::Delay | Self::Scale | Self::PositionScale | Self::Transport => 1,
-            Self::Rate | Self::Orientation | Self::Gravity | Self::ForceBias | Self::Lever => 3,
+            Self::Rate | Self::Orientation | Self::AxisScales | Self::Gravity | Self::ForceBias | Self::Lever => 3,
         }
     }
 
@@ -68,7 +74,12 @@ impl Parameter {
     fn sigma(self) -> f64 {
         match self {
             Self::Rate | Self::Delay => 0.1,
-            Self::Orientation | Self::Scale | Self::Lever | Self::PositionScale | Self::Transport => 1.0,
+            Self::Orientation
+            | Self::Scale
+            | Self::AxisScales
+            | Self::Lever
+            | Self::PositionScale
+            | Self::Transport => 1.0,
             Self::ForceBias => 3.0,
             Self::Gravity => 100.0,
         }
@@ -85,6 +96,8 @@ pub(super) struct Row {
     pub(super) jacobian: Matrix3xX<f64>,
     /// Variance of noise and tolerance per axis.
     pub(super) variance: f64,
+    /// Size of what is measured, in the unit of the residual: small ones show no fault.
+    pub(super) signal: f64,
 }
 
 /// Change of a parameter, constant or from a time on.
@@ -226,7 +239,7 @@ impl Comparison<'_> {
         let bins = self.bins(&misfits);
         let suspect = self.suspect(&sound, &weights, square).filter(|_| misfit > LARGEST_MISFIT);
         if disagrees.is_none() && misfit > LARGEST_MISFIT || suspect.is_some() {
-            disagrees = Some(if suspect.is_some() { FindingInterval::default() } else { interval(&bins) });
+            disagrees = Some(if suspect.is_some() { FindingInterval::default() } else { self.interval(&bins) });
             change = suspect;
         }
         let of_axis = |axis: usize| {
@@ -342,6 +355,29 @@ impl Comparison<'_> {
         self.rows.iter().map(misfit).collect()
     }
 
+    /// Time of the bins beyond the largest misfit. It has an end only if at least two bins beyond it agree although as much is
+    /// measured in them.
+    fn interval(&self, bins: &[[f64; 2]]) -> FindingInterval {
+        let half_s = bins.windows(2).map(|pair| 0.5 * (pair[1][0] - pair[0][0])).fold(BIN_S, f64::min);
+        let signal = |bin: &[f64; 2]| {
+            let inside = self.rows.iter().filter(|row| (row.time_s - bin[0]).abs() <= half_s);
+            median(&inside.map(|row| row.signal).collect::<Vec<_>>())
+        };
+        let beyond = |bin: &&[f64; 2]| bin[1] > LARGEST_MISFIT;
+        let usual = median(&bins.iter().filter(beyond).map(signal).collect::<Vec<_>>());
+        let shows =
+            |bins: &[[f64; 2]]| bins.iter().filter(|bin| signal(bin) > SHOWING_RATIO * usual).count() >= MIN_SOUND;
+        let (Some(first), Some(last)) =
+            (bins.iter().position(|bin| beyond(&bin)), bins.iter().rposition(|bin| beyond(&bin)))
+        else {
+            return FindingInterval::default();
+        };
+        FindingInterval {
+            since_s: shows(&bins[..first]).then(|| bins[first][0] - half_s),
+            until_s: shows(&bins[last + 1..]).then(|| bins[last][0] + half_s),
+        }
+    }
+
     /// Median misfit in bins of equal length.
     fn bins(&self, misfits: &[f64]) -> Vec<[f64; 2]> {
         let (Some(first), Some(last)) = (self.rows.first(), self.rows.last()) else { return Vec::new() };
@@ -359,24 +395,11 @@ impl Comparison<'_> {
 }
 
 /// Root of the mean square of misfits in three axes, from a quantile of them.
-fn root_mean_square(misfits: &[f64]) -> f64 {
+pub(super) fn root_mean_square(misfits: &[f64]) -> f64 {
     percentile(misfits, COMPARED_QUANTILE) / mean_square_quantile(3.0, COMPARED_SIGMAS).sqrt()
 }
 
 /// Residual that some columns leave.
 fn rest(row: &Row, columns: &[usize], values: &DVector<f64>) -> Vector3<f64> {
     row.residual - row.jacobian.select_columns(columns) * values
-}
-
-/// Time of the bins beyond the largest misfit, without an end at the first and the last bin.
-fn interval(bins: &[[f64; 2]]) -> FindingInterval {
-    let beyond = |bin: &[f64; 2]| bin[1] > LARGEST_MISFIT;
-    let half_s = bins.windows(2).map(|pair| 0.5 * (pair[1][0] - pair[0][0])).fold(BIN_S, f64::min);
-    let end = |place: Option<usize>, edge: usize, sign: f64| {
-        place.filter(|place| place.abs_diff(edge) > 1).map(|place| bins[place][0] + sign * half_s)
-    };
-    FindingInterval {
-        since_s: end(bins.iter().position(beyond), 0, -1.0),
-        until_s: end(bins.iter().rposition(beyond), bins.len().saturating_sub(1), 1.0),
-    }
 }

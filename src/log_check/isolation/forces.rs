@@ -64,7 +64,8 @@ pub(super) fn compare(compared: &Compared<'_>, body_from_imu: &UnitQuaternion<f6
         jacobian.set_column(POSITION_SCALE, &window.acceleration);
         jacobian.set_column(TRANSPORT, &-window.transport);
         let residual = window.force - window.acceleration;
-        Row { time_s: window.time_s, residual, jacobian, variance }
+        let signal = window.acceleration.norm();
+        Row { time_s: window.time_s, residual, jacobian, variance, signal }
     };
     let rows: Vec<Row> = windows.iter().map(row).collect();
     Comparison { rows: &rows, parameters: &PARAMETERS, sound: SOUND, changing: &[Parameter::ForceBias] }.fit()

@@ -6,6 +6,7 @@ mod comparison;
 mod culprits;
 mod directions;
 mod forces;
+mod joints;
 mod orientations;
 mod pair;
 mod rotation;
@@ -47,7 +48,8 @@ pub(super) fn isolate(compared: &Compared<'_>, findings: &mut Findings) -> Agree
     for statement in &mut statements {
         exclude_causes(statement, &rotations, findings);
     }
-    let motion = truth.map_or_else(Vec::new, |truth| compared.motion(&truth, findings));
+    let suspected: Vec<Source> = statements.iter().flat_map(|statement| statement.suspected.clone()).collect();
+    let motion = truth.map_or_else(Vec::new, |truth| compared.motion(&truth, &suspected, findings));
     statements.extend(Statement::of(&motion_culprits(&motion), &motion));
     let isolated = statements.iter().map(|statement| statement.title.clone()).collect();
     for statement in statements {
@@ -99,8 +101,9 @@ impl Compared<'_> {
         (pairs, truth)
     }
 
-    /// Pairs of the accelerometer and the images with the motion of the ground truth.
-    fn motion(&self, truth: &TruthOffsets, findings: &Findings) -> Vec<Pair> {
+    /// Pairs of the accelerometer and the images with the motion of the ground truth, but for images whose rotations are
+    /// suspected.
+    fn motion(&self, truth: &TruthOffsets, suspected: &[Source], findings: &Findings) -> Vec<Pair> {
         let TruthOffsets { body_from_imu, delay_s } = truth;
         let mut pairs = Vec::new();
         let mut add = |quantity, source: Source, fit: Fit| {
@@ -112,7 +115,8 @@ impl Compared<'_> {
         {
             add(Quantity::SpecificForce, Source::Accelerometer, fit);
         }
-        for camera in &self.rig.cameras {
+        let cameras = self.rig.cameras.iter();
+        for camera in cameras.filter(|camera| !suspected.contains(&images_of(camera))) {
             let angles = directions::angles_rad(self, camera, body_from_imu, *delay_s);
             if let Some(fit) = fit_of_directions(&angles) {
                 add(Quantity::Direction, images_of(camera), fit);
@@ -126,7 +130,16 @@ impl Compared<'_> {
         let verdicts: Vec<Verdict> = pairs.iter().map(Pair::verdict).collect();
         let alternatives = culprits(&verdicts);
         let suspected: BTreeSet<&Source> = alternatives.iter().flatten().collect();
-        self.exchange(&suspected, pairs).or_else(|| Statement::of(&alternatives, pairs))
+        if let Some(exchange) = self.exchange(&suspected, pairs) {
+            return Some(exchange);
+        }
+        if let [only] = alternatives.as_slice()
+            && let [images] = only.as_slice()
+            && let Some(of_joint) = self.of_joint(images, pairs)
+        {
+            return Statement::of(&culprits(&of_joint.iter().map(Pair::verdict).collect::<Vec<_>>()), &of_joint);
+        }
+        Statement::of(&alternatives, pairs)
     }
 
     /// Two suspected cameras, each of which agrees with the gyroscope by the images of the other one.

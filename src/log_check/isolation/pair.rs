@@ -8,6 +8,7 @@ use super::source::Source;
 use crate::log_check::report::agreement::{PairAgreement, Quantity};
 
 /// Two sources with their comparison.
+#[derive(Clone)]
 pub(super) struct Pair {
     pub(super) quantity: Quantity,
     pub(super) sources: [Source; 2],

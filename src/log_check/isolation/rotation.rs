@@ -24,18 +24,21 @@ const ROUNDS: usize = 3;
 const HALF_STEP_S: f64 = 0.005;
 /// Constant differences that are a disagreement.
 const WRONG_DELAY_S: f64 = 0.02;
-const WRONG_SCALE: f64 = 0.05;
+pub(super) const WRONG_SCALE: f64 = 0.05;
 /// Number of standard deviations from which they are.
 const SIGNIFICANT_SIGMAS: f64 = 5.0;
 /// Ratio of the misfit in other axes to that in the rig's from which they are the first guess.
 const OTHER_AXES_RATIO: f64 = 0.5;
 
-const PARAMETERS: [Parameter; 4] = [Parameter::Rate, Parameter::Orientation, Parameter::Delay, Parameter::Scale];
-/// Columns of the orientation, the delay and the scale.
+const PARAMETERS: [Parameter; 5] =
+    [Parameter::Rate, Parameter::Orientation, Parameter::Delay, Parameter::Scale, Parameter::AxisScales];
+/// Number of the parameters that sound sources have, and columns of the others.
+const SOUND: usize = 4;
 const ORIENTATION: usize = 3;
 const DELAY: usize = 6;
 const SCALE: usize = 7;
-const COLUMNS: usize = 8;
+const AXIS_SCALES: usize = 8;
+const COLUMNS: usize = 11;
 
 /// Constant differences of two sources of rotation.
 #[derive(Clone, Copy, Debug)]
@@ -71,7 +74,7 @@ pub(super) fn compare(one: &Orientations, other: &Orientations) -> Option<([Sour
     for round in 0..ROUNDS {
         let rows = rows(first, second, &intervals, &offsets);
         let comparison =
-            Comparison { rows: &rows, parameters: &PARAMETERS, sound: PARAMETERS.len(), changing: &PARAMETERS };
+            Comparison { rows: &rows, parameters: &PARAMETERS, sound: SOUND, changing: &PARAMETERS[..SOUND] };
         let found = comparison.fit()?;
         if round + 1 < ROUNDS {
             let step = Vector3::from_iterator(found.constants[ORIENTATION..DELAY].iter().copied());
@@ -120,7 +123,7 @@ fn rows(first: &Orientations, second: &Orientations, intervals_s: &[[f64; 2]], o
             let (rotation, variance) = second.rotation_between(from_s + delay_s, to_s + delay_s)?;
             Some((turn * so3::log(&rotation), variance))
         };
-        let (predicted, of_second) = at(offsets.delay_s)?;
+        let (predicted, noise_of_second) = at(offsets.delay_s)?;
         let by_delay =
             (at(offsets.delay_s + HALF_STEP_S)?.0 - at(offsets.delay_s - HALF_STEP_S)?.0) / (2.0 * HALF_STEP_S);
         let measured = so3::log(&measured);
@@ -130,16 +133,19 @@ fn rows(first: &Orientations, second: &Orientations, intervals_s: &[[f64; 2]], o
         jacobian.fixed_columns_mut::<3>(ORIENTATION).copy_from(&-so3::hat(&predicted));
         jacobian.set_column(DELAY, &by_delay);
         jacobian.set_column(SCALE, &predicted);
-        Some((0.5 * (from_s + to_s), measured - predicted, jacobian, of_first + of_second, measured.norm()))
+        let of_second = turn.transpose() * predicted;
+        jacobian.fixed_columns_mut::<3>(AXIS_SCALES).copy_from(&(turn * Matrix3::from_diagonal(&of_second)));
+        Some((0.5 * (from_s + to_s), measured - predicted, jacobian, of_first + noise_of_second, measured.norm()))
     };
     let found: Vec<_> = intervals_s.iter().filter_map(row).collect();
     let usual_rad = median(&found.iter().map(|(.., rotation_rad)| *rotation_rad).collect::<Vec<_>>());
     let tolerated_variance = TOLERATED_RAD.powi(2) + (TOLERATED_RATIO * usual_rad).powi(2);
-    let row = |(time_s, residual, jacobian, noise, _)| Row {
+    let row = |(time_s, residual, jacobian, noise, signal)| Row {
         time_s,
         residual,
         jacobian,
         variance: tolerated_variance + NOISE_TOLERANCE.powi(2) * noise,
+        signal,
     };
     found.into_iter().map(row).collect()
 }

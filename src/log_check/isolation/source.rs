@@ -12,6 +12,11 @@ pub(super) enum Source {
         camera_key: String,
         with_joints: bool,
     },
+    /// One joint of the gimbal, by the images of a camera on it.
+    Joint {
+        joint: String,
+        camera_key: String,
+    },
     /// Topic of the vehicle's attitude.
     Attitude(String),
     GroundTruth,
@@ -28,6 +33,7 @@ impl Source {
             Self::Accelerometer => "the accelerometer".to_owned(),
             Self::Images { camera_key, with_joints: false } => format!("the images of {camera_key}"),
             Self::Images { camera_key, with_joints: true } => format!("the images of {camera_key} on the gimbal"),
+            Self::Joint { joint, camera_key } => format!("the angles of joint '{joint}' by the images of {camera_key}"),
             Self::Attitude(topic) => format!("the attitude {topic}"),
             Self::GroundTruth => "the ground truth".to_owned(),
             Self::Positions => "the motion of the ground truth".to_owned(),
@@ -36,12 +42,16 @@ impl Source {
     }
 
     pub(super) fn camera_key(&self) -> Option<&str> {
-        if let Self::Images { camera_key, .. } = self { Some(camera_key) } else { None }
+        if let Self::Images { camera_key, .. } | Self::Joint { camera_key, .. } = self {
+            Some(camera_key)
+        } else {
+            None
+        }
     }
 
     /// Verb with which its name goes.
     pub(super) fn disagrees(&self) -> &'static str {
-        if matches!(self, Self::Images { .. }) { "disagree" } else { "disagrees" }
+        if matches!(self, Self::Images { .. } | Self::Joint { .. }) { "disagree" } else { "disagrees" }
     }
 
     /// Subject of a finding about it.
@@ -49,7 +59,7 @@ impl Source {
         match self {
             Self::Gyroscope | Self::Accelerometer | Self::GimbalImu => Area::Imu,
             Self::Images { .. } => Area::Extrinsics,
-            Self::Attitude(_) => Area::Encoders,
+            Self::Joint { .. } | Self::Attitude(_) => Area::Encoders,
             Self::GroundTruth | Self::Positions => Area::Log,
         }
     }
@@ -63,7 +73,7 @@ impl Source {
                 let of_camera = matches!(area, Area::Images | Area::Intrinsics | Area::Extrinsics | Area::Time);
                 of_camera || (*with_joints && area == Area::Encoders)
             }
-            Self::Attitude(_) => matches!(area, Area::Encoders | Area::Time),
+            Self::Joint { .. } | Self::Attitude(_) => matches!(area, Area::Encoders | Area::Time),
             Self::GroundTruth | Self::Positions => matches!(area, Area::Log | Area::Time),
         }
     }
@@ -73,7 +83,7 @@ impl Source {
         match self {
             Self::Gyroscope | Self::Accelerometer => sensor == Sensor::Imu,
             Self::Images { with_joints, .. } => sensor == Sensor::Camera || (*with_joints && sensor == Sensor::Joints),
-            Self::GimbalImu | Self::Attitude(_) => sensor == Sensor::Joints,
+            Self::GimbalImu | Self::Joint { .. } | Self::Attitude(_) => sensor == Sensor::Joints,
             Self::GroundTruth | Self::Positions => false,
         }
     }
@@ -92,6 +102,9 @@ impl Source {
             }
             Self::Images { with_joints: true, .. } => {
                 "check the joint angles and the chain of the gimbal in the rig, then order, stamps and content of the images"
+            }
+            Self::Joint { .. } => {
+                "check the encoder of this joint: its zero, direction, scale, delay, steps and the play of its gear"
             }
             Self::Attitude(_) => "check axes, frame and stamps of the attitude",
             Self::GroundTruth => {

@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 
 use super::comparison::{Change, Parameter};
 use super::pair::Pair;
+use super::rotation::WRONG_SCALE;
 use super::source::Source;
 use crate::faults::{Area, Severity};
 use crate::geometry::so3;
@@ -151,6 +152,7 @@ fn detail(change: &Change, pair: &Pair, is_first: bool) -> Option<String> {
     };
     let is_constant = pair.fit.disagrees.is_none_or(|interval| interval == FindingInterval::default());
     let value = sign * change.values.first()?;
+    let factor = |value: f64| if is_first { 1.0 + value } else { 1.0 / (1.0 + value) };
     Some(match change.parameter {
         Parameter::Rate => {
             let rate = vector();
@@ -165,7 +167,13 @@ fn detail(change: &Change, pair: &Pair, is_first: bool) -> Option<String> {
             let then = if is_constant { "" } else { "then " };
             format!("stamps are {then}{:.0} ms {side}", 1e3 * value.abs())
         }
-        Parameter::Scale => format!("its rotations are {:.3} times theirs", 1.0 + value),
+        Parameter::Scale => format!("its rotations are {:.3} times theirs", factor(*change.values.first()?)),
+        Parameter::AxisScales => {
+            let axes = ["x", "y", "z"].into_iter().zip(change.values.iter().map(|value| factor(*value)));
+            let wrong = axes.filter(|(_, factor)| (factor - 1.0).abs() > WRONG_SCALE);
+            let texts: Vec<String> = wrong.map(|(axis, factor)| format!("{factor:.3} times about {axis}")).collect();
+            format!("its rotations are {} theirs", all_of(&texts, "and"))
+        }
         Parameter::ForceBias => {
             let bias = vector();
             format!("its specific forces shift by ({:+.2}, {:+.2}, {:+.2}) m/s²", bias.x, bias.y, bias.z)
