@@ -92,7 +92,9 @@ pub(crate) fn report(arguments: &ReportArguments) -> Result<ExitOutcome> {
         inputs: arguments.estimation.input_files(&arguments.log),
         figures,
     };
-    computation.set_check(options.check.iter().flat_map(|check| check.findings.clone()).collect());
+    if let Some(checked) = &options.check {
+        computation.set_check(checked.clone());
+    }
     let recording = computation.recording();
     let written = write_report(recording, &arguments.output, &options)?;
     print(&format!("{}\n", page_of(arguments).display()))?;

@@ -475,7 +475,7 @@ impl Shown {
                 let Some(cache) = checked_with else { return compute(plan, Some(until_ns)) };
                 let (computed, checked) = beside_check(plan, cache, || compute(plan, Some(until_ns)));
                 let mut computation = computed?;
-                computation.set_check(checked.findings);
+                computation.set_check(checked);
                 Ok(computation)
             }
             Source::Saved(session) => {

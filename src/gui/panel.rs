@@ -280,6 +280,8 @@ pub enum Dialog {
     Fork,
     /// Finds the cause of residuals of the selected run that disagree with their noise.
     Diagnosis,
+    /// Shows which sources of measurements agree, by the check of the log.
+    Sources,
     /// Lists the markers with their names.
     Markers,
     Palette,

@@ -122,6 +122,7 @@ fn recording_of(flight: &SyntheticFlight, runs: &[&str]) -> Recording {
         position_truth: None,
         trajectories: Vec::new(),
         check: None,
+        agreement: Arc::default(),
         is_being_checked: false,
         warnings: vec![LogWarning::new(
             WarningKind::ImuGap,

@@ -187,6 +187,7 @@ pub(crate) const TABLE: &[Entry] = &[
     entry(Action::Dialog(Dialog::Fork), "Fork the shown run at the cursor…", "F", &[(NONE, Key::F)]),
     entry(Action::Dialog(Dialog::AddRun), "Add a run…", "A", &[(NONE, Key::A)]),
     entry(Action::Dialog(Dialog::Diagnosis), "Diagnose the shown run…", "D", &[(NONE, Key::D)]),
+    entry(Action::Dialog(Dialog::Sources), "Show which sources agree…", "U", &[(NONE, Key::U)]),
     entry(Action::Warnings, "List warnings", "W", &[(NONE, Key::W)]),
     entry(Action::Theme, "Toggle dark and light theme", "T", &[(NONE, Key::T)]),
     entry(Action::Layout(Preset::Overview), "Layout: overview", "1", &[(NONE, Key::Num1)]),

@@ -150,6 +150,11 @@ fn buttons_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, answer: &Answer, actions:
             ctx.commands.push(Command::Fork { run: ctx.run_number(), changes, label: None });
         }
     }
+    let agreement = &ctx.recording.agreement;
+    let hint = "Which sources of measurements agree, and since when others disagree (U)";
+    if !agreement.isolated.is_empty() && ui.button("Sources").on_hover_text(hint).clicked() {
+        actions.push(Action::Dialog(Dialog::Sources));
+    }
     if ui.button("Show").on_hover_text("Move the cursor to its start and show what it is about").clicked() {
         findings::show(ctx, first);
     }

@@ -71,7 +71,7 @@ impl Menu {
             ],
             Self::Run => &[
                 &[Action::Dialog(Dialog::AddRun), Action::Dialog(Dialog::Fork), Action::NextRun],
-                &[Action::Dialog(Dialog::Diagnosis)],
+                &[Action::Dialog(Dialog::Diagnosis), Action::Dialog(Dialog::Sources)],
                 &[Action::Breakpoint, Action::Hit(true), Action::Hit(false)],
             ],
             Self::Playback => &[

@@ -210,6 +210,7 @@ fn recording_of(ranks: &[usize]) -> Recording {
         position_truth: None,
         trajectories: Vec::new(),
         check: None,
+        agreement: Arc::default(),
         is_being_checked: false,
         warnings: Vec::new(),
         memory_budget_bytes: usize::MAX,

@@ -7,7 +7,7 @@ use super::history::{History, SnapshotUse};
 use super::recompute::{Detail, RecomputeRequest, Recomputed};
 use crate::estimator::CalibrationPosterior;
 use crate::flight_log::LogWarning;
-use crate::log_check::Finding;
+use crate::log_check::CheckReport;
 use crate::sensors::RequiredAccuracy;
 use crate::session::plan::SessionPlan;
 use crate::session::record::{
@@ -69,10 +69,11 @@ impl Computation {
         }
     }
 
-    /// Stores the findings of the check of the log and its rig, on which the answers of the runs depend.
-    pub fn set_check(&mut self, findings: Vec<Finding>) {
+    /// Stores the result of the check of the log and its rig, on which the answers of the runs depend.
+    pub fn set_check(&mut self, checked: CheckReport) {
         let recording = self.recording_mut();
-        (recording.check, recording.is_being_checked) = (Some(Arc::new(findings)), false);
+        recording.agreement = Arc::new(checked.agreement);
+        (recording.check, recording.is_being_checked) = (Some(Arc::new(checked.findings)), false);
     }
 
     /// The check of the log has been started beside the runs.

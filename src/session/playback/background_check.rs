@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use rayon::ThreadPoolBuilder;
 
-use crate::log_check::Finding;
+use crate::log_check::CheckReport;
 use crate::session::plan::SessionError;
 
 /// Time between two looks for the first step of a run, before which the check does not begin.
@@ -20,11 +20,11 @@ pub(super) struct BackgroundCheck {
 }
 
 impl BackgroundCheck {
-    /// Starts `check` on one core as soon as `has_begun`, so that it delays no first image; `store` gets its findings.
+    /// Starts `check` on one core as soon as `has_begun`, so that it delays no first image; `store` gets its result.
     pub(super) fn start(
-        check: impl FnOnce() -> Vec<Finding> + Send + 'static,
+        check: impl FnOnce() -> CheckReport + Send + 'static,
         has_begun: impl Fn() -> bool + Send + 'static,
-        store: impl FnOnce(Vec<Finding>) + Send + 'static,
+        store: impl FnOnce(CheckReport) + Send + 'static,
     ) -> Result<Self, SessionError> {
         let cancelled = Arc::new(AtomicBool::new(false));
         let stop = Arc::clone(&cancelled);
@@ -36,12 +36,12 @@ impl BackgroundCheck {
                 }
                 std::thread::sleep(WAIT);
             }
-            let findings = match ThreadPoolBuilder::new().num_threads(1).build() {
+            let checked = match ThreadPoolBuilder::new().num_threads(1).build() {
                 Ok(pool) => pool.install(check),
                 Err(_no_threads) => check(),
             };
             if !is_cancelled() {
-                store(findings);
+                store(checked);
             }
         };
         // The handle is not kept: a window that closes a log does not wait for its check.

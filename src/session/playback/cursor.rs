@@ -272,6 +272,7 @@ mod tests {
                 position_truth: None,
                 trajectories: Vec::new(),
                 check: None,
+                agreement: std::sync::Arc::default(),
                 is_being_checked: false,
                 warnings: Vec::new(),
                 memory_budget_bytes: usize::MAX,

@@ -94,7 +94,7 @@ impl Session {
     ) -> Result<(), SessionError> {
         let (has_begun, store) = self.shared.receiver_of_check();
         let (log, rig) = (Arc::clone(&self.plan.log), Arc::clone(&self.plan.rig));
-        let check = move || check(&log, &rig).findings;
+        let check = move || check(&log, &rig);
         self.check = Some(BackgroundCheck::start(check, has_begun, store)?);
         Ok(())
     }
@@ -102,7 +102,7 @@ impl Session {
     /// Calls `check` with the log and its rig; returns when the findings are in the record.
     pub fn check_log(&self, check: impl FnOnce(&Arc<FlightLog>, &Rig) -> CheckReport) {
         let checked = check(&self.plan.log, &self.plan.rig);
-        self.shared.change(|computation| computation.set_check(checked.findings));
+        self.shared.change(|computation| computation.set_check(checked));
     }
 
     /// The reports so far; a cheap copy.

@@ -8,7 +8,7 @@ use std::thread::{Builder, JoinHandle};
 
 use parking_lot::Mutex;
 
-use crate::log_check::Finding;
+use crate::log_check::CheckReport;
 use crate::session::engine::{Computation, EngineMessage, RecomputeRequest, Recomputed};
 use crate::session::plan::SessionError;
 use crate::session::record::{Diagnosis, Recording, RunRecord};
@@ -76,7 +76,7 @@ impl SharedComputation {
     /// Function that stores the findings of the check, and one that is true once a run has a step.
     pub(super) fn receiver_of_check(
         &self,
-    ) -> (impl Fn() -> bool + Send + 'static, impl FnOnce(Vec<Finding>) + Send + 'static) {
+    ) -> (impl Fn() -> bool + Send + 'static, impl FnOnce(CheckReport) + Send + 'static) {
         let (state, known) = (Arc::clone(&self.state), Arc::clone(&self.state));
         self.change(Computation::begin_check);
         let has_begun = move || {
@@ -85,8 +85,8 @@ impl SharedComputation {
             // A run without a usable image ends without any step.
             runs.iter().any(|run| !run.steps.is_empty()) || runs.iter().all(RunRecord::has_ended)
         };
-        let store = move |findings| {
-            state.change(|computation| computation.set_check(findings));
+        let store = move |checked| {
+            state.change(|computation| computation.set_check(checked));
             if let Some(wake) = state.wake.lock().as_ref() {
                 wake();
             }

@@ -8,7 +8,7 @@ use super::trajectory_lane::TrajectoryLane;
 use crate::flight_log::{LogWarning, WarningKind};
 use crate::geometry::ns_from_seconds;
 use crate::gimbal::ParameterId;
-use crate::log_check::Finding;
+use crate::log_check::{Agreement, Finding};
 use crate::sensors::Rig;
 use crate::session::plan::{FlightPrior, LoadedTrajectory, RunSpec, SessionPlan, chain_parameters};
 
@@ -37,6 +37,8 @@ pub struct Recording {
     pub trajectories: Vec<Arc<TrajectoryLane>>,
     /// Findings of the check of the log and its rig, most severe first; `None` as long as they are not known.
     pub check: Option<Arc<Vec<Finding>>>,
+    /// Agreement of the sources that measure one quantity, by the check; empty as long as it is not known.
+    pub agreement: Arc<Agreement>,
     /// True while the log and its rig are being checked beside the runs.
     pub is_being_checked: bool,
     /// Warnings about the log so far, in time order.
@@ -102,6 +104,7 @@ impl Recording {
             position_truth: position_truth.clone(),
             trajectories: plan.trajectories.iter().map(|loaded| Arc::new(lane(loaded))).collect(),
             check: None,
+            agreement: Arc::default(),
             is_being_checked: false,
             warnings: Vec::new(),
             memory_budget_bytes: plan.memory_budget_bytes,

@@ -1,4 +1,4 @@
-//! Modal dialogs, one of which is open at a time, and the window of the diagnosis beside them.
+//! Modal dialogs, one of which is open at a time, and the windows of the diagnosis and of the sources beside them.
 
 mod add_run;
 mod diagnosis;
@@ -12,6 +12,7 @@ mod palette;
 mod palette_items;
 mod questions;
 mod settings;
+mod sources;
 pub(super) mod state;
 
 use egui::Ui;
@@ -48,8 +49,9 @@ pub(super) fn ui(ui: &Ui, dialogs: &mut Dialogs, ctx: &mut PanelContext<'_>, par
         requests.push(WindowRequest::OpenLog(paths));
     }
     dialogs.diagnosis_open = dialogs.diagnosis_open && diagnosis::ui(ui, ctx);
+    dialogs.sources_open = dialogs.sources_open && sources::ui(ui, ctx);
     let stays_open = match dialogs.open {
-        None | Some(Dialog::Diagnosis) => return,
+        None | Some(Dialog::Diagnosis | Dialog::Sources) => return,
         Some(Dialog::OpenLog) => {
             let (path, stays_open) = dialogs.open_log.ui(ui, ctx.theme);
             requests.extend(path.map(|path| WindowRequest::OpenLog(vec![path])));

@@ -19,6 +19,8 @@ pub struct Dialogs {
     pub shortcuts_open: bool,
     /// True if the window of the diagnosis is open, which is not modal.
     pub(super) diagnosis_open: bool,
+    /// True while the window of the sources is open.
+    pub(super) sources_open: bool,
     pub(super) open_log: OpenLogDialog,
     pub(super) add_run: AddRunDialog,
     pub(super) fork: ForkDialog,
@@ -37,11 +39,15 @@ impl Dialogs {
         self.open_log = OpenLogDialog::new(desktop);
     }
 
-    /// Opens a dialog and closes the open one, except that the diagnosis is a window beside it; the palette opens with an empty input.
+    /// Opens a dialog and closes the open one, except that the diagnosis and the sources are windows beside it; the palette opens with an empty input.
     pub fn show(&mut self, dialog: Dialog) {
         match dialog {
             Dialog::Diagnosis => {
                 self.diagnosis_open = true;
+                return;
+            }
+            Dialog::Sources => {
+                self.sources_open = true;
                 return;
             }
             Dialog::OpenLog => self.open_log.show_picker(),
