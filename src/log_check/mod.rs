@@ -8,7 +8,6 @@ mod clock_alignment;
 mod extrinsics;
 mod gimbal;
 mod ground_truth;
-mod held;
 mod images;
 mod imu;
 mod isolation;

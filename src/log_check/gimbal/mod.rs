@@ -8,9 +8,9 @@ pub(super) mod vehicle_attitude;
 use std::f64::consts::{PI, TAU};
 
 use self::frozen_joints::AT_LIMIT_RAD;
-use super::held::Held;
 use super::report::{Area, Findings, Measurement, Severity};
 use super::statistics::{median, percentile, white_sigma};
+use super::survey::held::Held;
 use super::survey::{Survey, is_in_radians};
 use crate::flight_log::joints::JointReading;
 use crate::flight_log::joints::attitude::MAX_VEHICLE_GAP_NS;

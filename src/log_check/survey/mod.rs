@@ -2,6 +2,7 @@
 
 pub(super) mod attitude;
 pub(super) mod gradient_sums;
+pub(super) mod held;
 pub(super) mod image_content;
 mod imu_samples;
 pub(super) mod topic_survey;

@@ -1,8 +1,8 @@
 //! Sensors whose messages hold the last value: they are sent faster than the sensor measures, so that their stamps are late
 //! by up to the time between two measurements.
 
-use super::report::{Area, Findings, Severity};
 use crate::geometry::seconds_from_ns;
+use crate::log_check::report::{Area, Findings, Severity};
 
 /// Smallest part of the messages of an interval that repeat the value before.
 const MIN_REPEATED: f64 = 0.2;
@@ -18,7 +18,7 @@ const COMPARED_S: f64 = 0.02;
 
 /// Values that are held in an interval of the log.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Held {
+pub(crate) struct Held {
     /// Rate of new values and of messages, in Hz.
     new_hz: f64,
     message_hz: f64,
@@ -32,7 +32,7 @@ pub(super) struct Held {
 impl Held {
     /// Held values among values with their stamps in nanoseconds, ordered by stamp; `None` if they change as they should, or
     /// repeat irregularly.
-    pub(super) fn of<T: PartialEq>(values: &[(i64, T)]) -> Option<Self> {
+    pub(crate) fn of<T: PartialEq>(values: &[(i64, T)]) -> Option<Self> {
         let runs: Vec<&[(i64, T)]> = values.chunk_by(|one, other| one.1 == other.1).collect();
         let is_repeated = |run: &&[(i64, T)]| run.len() > 1;
         let (first, last) = (runs.iter().position(is_repeated)?, runs.iter().rposition(is_repeated)?);
@@ -59,7 +59,7 @@ impl Held {
         })
     }
 
-    pub(super) fn report(&self, area: Area, name: &str, verb: &str, findings: &mut Findings) {
+    pub(crate) fn report(&self, area: Area, name: &str, verb: &str, findings: &mut Findings) {
         let Self { new_hz, message_hz, .. } = self;
         let title = format!("{name} {verb} values: {new_hz:.1} new ones per second in messages at {message_hz:.0} Hz");
         let evidence = format!(
@@ -73,7 +73,7 @@ impl Held {
     }
 
     /// True if the late stamps explain differences from other sensors.
-    pub(super) fn is_late(&self) -> bool {
+    pub(crate) fn is_late(&self) -> bool {
         self.new_hz * COMPARED_S < 1.0
     }
 }
