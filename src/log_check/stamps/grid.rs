@@ -35,10 +35,12 @@ pub(super) fn tick_s(spacing: &Spacing) -> Option<f64> {
     let is_multiple = |step: &&f64| (*step - unit * (*step / unit).round()).abs() < SAME_S;
     let explained = steps.iter().filter(is_multiple).count() as f64;
     let mean_s = steps.iter().sum::<f64>() / steps.len() as f64;
+    // Times of equal spacing are rounded to one of the two multiples beside them.
+    let beside = steps.iter().filter(|step| (*step - mean_s).abs() < unit).count() as f64;
     let is_rounded = steps.len() >= MIN_STEPS
         && lengths.len() > 1
         && (MIN_TICK_S..LARGEST_TICK_RATIO * mean_s).contains(&unit)
-        && explained > EXPLAINED_RATIO * steps.len() as f64;
+        && explained.min(beside) > EXPLAINED_RATIO * steps.len() as f64;
     is_rounded.then_some(unit)
 }
 
@@ -69,6 +71,7 @@ mod tests {
         // Milliseconds, a regular camera, one that loses images, and jitter.
         assert_eq!(tick_of(|number| (number / 30.0 * 1000.0).round() / 1000.0), None);
         assert_eq!(tick_of(|number| 0.05 * number), None);
+        assert_eq!(tick_of(|number| 0.05 * number + 0.015 * (number % 2.0)), None);
         assert_eq!(tick_of(|number| 0.05 * (number + (number / 7.0).floor())), None);
         assert_eq!(tick_of(|number| 0.05 * number + 0.004 * (number * number * 0.37).sin()), None);
     }
