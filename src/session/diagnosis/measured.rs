@@ -17,6 +17,9 @@ use crate::log_check::{Finding, Verdict};
 use crate::sensors::Rig;
 use crate::session::engine::check_log;
 
+/// Faults of a sensor that disagrees with all others: no change of a run undoes them.
+const ISOLATED: [FaultKind; 2] = [FaultKind::UnusableImu, FaultKind::UnusableJoints];
+
 /// Changes that undo measured faults.
 #[derive(Debug, Default)]
 pub(super) struct Undoing {
@@ -37,8 +40,9 @@ impl Undoing {
             let of_faults: Vec<Vec<TrialHypothesis>> =
                 finding.faults.iter().filter_map(|fault| hypotheses(run, fault)).collect();
             let undone: Vec<TrialHypothesis> = of_faults.concat();
-            undoing.has_irreversible |=
-                undone.is_empty() && !of_faults.is_empty() && finding.severity == Severity::Error;
+            let is_isolated = finding.faults.iter().any(|fault| ISOLATED.contains(&fault.kind));
+            let is_certain = finding.severity == Severity::Error || is_isolated;
+            undoing.has_irreversible |= undone.is_empty() && !of_faults.is_empty() && is_certain;
             undoing.since = undoing.since.or_else(|| undone.iter().find_map(|it| it.from));
             if let ([_], Some(first)) = (&*finding.faults, undone.first().filter(|it| it.from.is_none())) {
                 all.extend(first.changes.corrections.iter().cloned());

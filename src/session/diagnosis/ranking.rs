@@ -7,6 +7,7 @@
 use super::hypotheses::TrialHypothesis;
 use super::trial::TrialResult;
 use crate::faults::{Choice, Explanation, Fault, FaultKind, MOST_REMAINING, criterion};
+use crate::geometry::quantile;
 use crate::session::misfit::agreement::disagreement;
 use crate::session::misfit::{Misfit, Scale};
 use crate::session::record::DiagnosisVerdict;
@@ -42,6 +43,11 @@ const MARGIN_RATIO: f64 = 0.05;
 const REMAINING: f64 = 0.4;
 /// Smallest gain of images without a half of them, relative to the score of the run: halves of sound images differ, too.
 const REGION_RATIO: f64 = 0.2;
+/// Quantile of the mean squares of a kind of factors over the steps, and its ratio to their median, from which residuals have
+/// a structure in time; and the smallest number of steps.
+const LARGE_QUANTILE: f64 = 0.95;
+const STRUCTURED_RATIO: f64 = 3.0;
+const MIN_STEPS: usize = 20;
 
 /// Score of a trial.
 pub(super) fn score(hypothesis: &TrialHypothesis, misfit: &Misfit, given: &Misfit, scale: &Scale) -> f64 {
@@ -72,6 +78,20 @@ impl RankedTrial {
         }
     }
 
+    /// True for a larger noise with residuals that are larger at some times than at others: they have a structure that white
+    /// noise does not have.
+    fn is_structured_noise(&self) -> bool {
+        let factor = match self.hypothesis.cause {
+            FaultKind::ImuNoise => 0,
+            FaultKind::EncoderNoise => 1,
+            _ => return false,
+        };
+        let tracking = self.result.steps.iter().filter(|step| step.tracking);
+        let squares: Vec<f64> = tracking.map(|step| step.factors[factor].mean_square()).collect();
+        let [usual, large] = [0.5, LARGE_QUANTILE].map(|fraction| quantile(&squares, fraction).unwrap_or(0.0));
+        squares.len() >= MIN_STEPS && large > STRUCTURED_RATIO * usual
+    }
+
     /// True if the search has found no value of the cause: its best value is one of the coarse ones, no refined one lies
     /// between the neighbours of this value, and it is the smallest or the largest, or a focal length of the whole run, which
     /// the columns of the intrinsics refine wherever they can.
@@ -98,7 +118,7 @@ pub(super) fn by_cause(given: &RankedTrial, mut candidates: Vec<RankedTrial>) ->
     let is_slight = |it: &RankedTrial| {
         it.hypothesis.cause == FaultKind::ImageRegion && given.score - it.score < REGION_RATIO * given.score
     };
-    candidates.retain(|candidate| !is_slight(candidate));
+    candidates.retain(|candidate| !is_slight(candidate) && !candidate.is_structured_noise());
     RankedTrial::sort(&mut candidates);
     let mut kept: Vec<RankedTrial> = Vec::new();
     for candidate in candidates {
