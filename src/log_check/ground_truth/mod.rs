@@ -204,6 +204,7 @@ impl GroundTruth<'_> {
             "add {offset_s:+.3} s to its stamps before errors against it are used; position errors contain this delay"
         );
         findings.add(Severity::Warning, Area::Time, title, evidence, remedy);
+        findings.mark_by_truth();
     }
 
     /// Compares the direction of the mean specific force in the world of the ground truth with the vertical (z up).
@@ -281,6 +282,7 @@ fn report_left_handed(reversed: &ClockAlignment, given: Option<&ClockAlignment>,
     let title = "the axes of the gyroscope form a left-handed frame, by the ground truth";
     let remedy = "correct order and signs of the axes in the IMU's driver, of gyroscope and accelerometer alike";
     findings.add(Severity::Error, Area::Imu, title, evidence, remedy);
+    findings.mark_by_truth();
 }
 
 fn report_failure(error: &AlignmentError, findings: &mut Findings) {
@@ -313,6 +315,7 @@ fn report_body(found: &ClockAlignment, rotations_of_imu: &[UnitQuaternion<f64>],
         let title = format!("the gyroscope measures {:.2} times the rotation of the ground truth", 1.0 / found.scale);
         let remedy = "check unit and range setting of the gyroscope, or imu0's scale factors in the rig";
         findings.add(Severity::Warning, Area::Imu, title, evidence.clone(), remedy);
+        findings.mark_by_truth();
     }
     if angle_rad > BODY_TOLERANCE_RAD.max(SIGNIFICANT_SIGMAS * sigma_rad) {
         let vector = so3::log(&body_from_imu).map(f64::to_degrees);

@@ -253,6 +253,16 @@ impl Comparison<'_> {
         Some(Fit { constants, sigmas, misfit, by_axis, noise, bins, disagrees, change })
     }
 
+    /// Values of a further parameter beside those of sound sources, with their standard deviations for a misfit in units of
+    /// the noise.
+    pub(super) fn further(&self, parameter: Parameter, misfit: f64) -> Option<Vec<[f64; 2]>> {
+        let columns = [self.columns(&self.parameters[..self.sound]), self.columns(&[parameter])].concat();
+        let (solution, covariance, _) = self.solved(&columns, &vec![1.0; self.rows.len()])?;
+        let first = columns.len() - parameter.width();
+        let value = |place: usize| [solution[place], misfit * covariance[(place, place)].sqrt()];
+        Some((first..columns.len()).map(value).collect())
+    }
+
     /// Columns of some parameters.
     fn columns(&self, of: &[Parameter]) -> Vec<usize> {
         let mut first = 0;

@@ -27,9 +27,10 @@ use self::pair::Pair;
 use self::source::Source;
 use self::statement::Statement;
 use super::report::agreement::{Agreement, Quantity};
-use super::report::{Finding, FindingInterval, Findings, Measurement, Severity};
+use super::report::{Area, Finding, FindingInterval, Findings, Measurement, Severity};
 use super::statistics::median;
 use crate::faults::{Fault, FaultKind};
+use crate::geometry::RigidTransform;
 use crate::sensors::{CameraMount, CameraRig};
 
 /// Misfit of directions in units of their noise from which they disagree; between it and [`LARGEST_MISFIT`] nothing is
@@ -133,6 +134,9 @@ impl Compared<'_> {
         if let Some(exchange) = self.exchange(&suspected, pairs) {
             return Some(exchange);
         }
+        if let Some(inverted) = self.inverted_truth(&suspected, pairs) {
+            return Some(inverted);
+        }
         if let [only] = alternatives.as_slice()
             && let [images] = only.as_slice()
             && let Some(of_joint) = self.of_joint(images, pairs)
@@ -140,6 +144,23 @@ impl Compared<'_> {
             return Statement::of(&culprits(&of_joint.iter().map(Pair::verdict).collect::<Vec<_>>()), &of_joint);
         }
         Statement::of(&alternatives, pairs)
+    }
+
+    /// Suspected ground truth whose orientations agree with the gyroscope if they are inverted.
+    fn inverted_truth(&self, suspected: &BTreeSet<&Source>, pairs: &[Pair]) -> Option<Statement> {
+        if !suspected.iter().all(|source| **source == Source::GroundTruth) {
+            return None;
+        }
+        let is_of_truth = |pair: &&Pair| pair.sources.contains(&Source::GroundTruth);
+        let given = pairs.iter().filter(is_of_truth).find(|pair| pair.sources.contains(&Source::Gyroscope))?;
+        let invert = |(stamp_ns, pose): &(i64, RigidTransform)| {
+            (*stamp_ns, RigidTransform::new(pose.rotation.inverse(), pose.translation_m))
+        };
+        let inverse: Vec<(i64, RigidTransform)> = self.poses.iter().map(invert).collect();
+        let gyroscope = Orientations::all(self).into_iter().find(|it| it.source == Source::Gyroscope)?;
+        let (_, fit, _) = rotation::compare(&gyroscope, &Orientations::of_truth(&inverse)?)?;
+        let is_inverse = given.fit.disagrees.is_some() && fit.disagrees.is_none() && fit.misfit < AGREEING_MISFIT;
+        is_inverse.then(|| Statement::of_inverted_truth([given.fit.misfit, fit.misfit]))
     }
 
     /// Two suspected cameras, each of which agrees with the gyroscope by the images of the other one.
@@ -201,6 +222,12 @@ fn exclude_causes(statement: &mut Statement, pairs: &[Pair], findings: &mut Find
     if !statement.is_isolated {
         return;
     }
+    // Two sources that disagree are blamed by the third one.
+    let mut excluded = match statement.suspected.as_slice() {
+        [Source::Gyroscope] => findings.retract_by_truth(|finding| statement.has_value || finding.area != Area::Imu),
+        [Source::GroundTruth] => findings.retract_by_truth(|finding| finding.area == Area::Imu),
+        _ => Vec::new(),
+    };
     let agreeing: Vec<&Source> =
         pairs.iter().filter(|pair| pair.fit.disagrees.is_none()).flat_map(|pair| &pair.sources).collect();
     let is_excluded = |finding: &Finding| {
@@ -215,9 +242,9 @@ fn exclude_causes(statement: &mut Statement, pairs: &[Pair], findings: &mut Find
         let changes = |fault: &Fault| fault.since_s.is_some() || fault.kind == FaultKind::FocalPieces;
         statement.is_measured_change && !finding.faults.iter().any(changes)
     };
-    let excluded = findings.retract_misfits(|finding| {
+    excluded.extend(findings.retract_misfits(|finding| {
         !finding.faults.is_empty() && (statement.is_cause || is_constant(finding) || is_excluded(finding))
-    });
+    }));
     for finding in excluded {
         statement.evidence.push_str("; excluded: ");
         statement.evidence.push_str(&finding.title);
@@ -242,6 +269,7 @@ fn is_explained(statement: &Statement, findings: &Findings) -> bool {
 
 /// Adds the finding in place of those that say that rotations, or the motion of the ground truth, are unexplained.
 fn report(statement: Statement, findings: &mut Findings) {
+    let fault = statement.fault();
     let mut evidence = statement.evidence;
     let of_motion = statement.suspected.iter().any(|it| matches!(it, Source::Accelerometer | Source::Positions));
     let is_replaced = |finding: &Finding| finding.faults.is_empty() && (!of_motion || statement.area == finding.area);
@@ -249,5 +277,6 @@ fn report(statement: Statement, findings: &mut Findings) {
         evidence = format!("{evidence}; {}", finding.evidence);
     }
     findings.add(statement.severity, statement.area, statement.title, evidence, statement.remedy);
+    findings.state_faults(fault);
     findings.state_times(statement.interval.since_s, statement.interval.until_s);
 }

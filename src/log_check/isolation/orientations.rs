@@ -54,7 +54,7 @@ impl Orientations {
         Self::of_nodes(Source::Gyroscope, times_s.filter_map(node))
     }
 
-    fn of_truth(poses: &Poses) -> Option<Self> {
+    pub(super) fn of_truth(poses: &Poses) -> Option<Self> {
         let nodes = poses.iter().map(|(stamp_ns, pose)| (seconds_from_ns(*stamp_ns), pose.rotation, 0.0, 0.0));
         (!poses.is_empty()).then(|| Self::of_nodes(Source::GroundTruth, nodes))
     }

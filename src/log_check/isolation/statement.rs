@@ -8,9 +8,10 @@ use super::comparison::{Change, Parameter};
 use super::pair::Pair;
 use super::rotation::WRONG_SCALE;
 use super::source::Source;
-use crate::faults::{Area, Severity};
+use crate::faults::{Area, Fault, FaultKind, Severity};
 use crate::geometry::so3;
 use crate::log_check::report::FindingInterval;
+use crate::log_check::report::agreement::Quantity;
 
 /// Largest error with which the factor on a missing term is one.
 const MISSING_TOLERANCE: f64 = 0.1;
@@ -32,7 +33,9 @@ pub(super) struct Statement {
     pub(super) is_isolated: bool,
     /// True if the sentence names the cause.
     pub(super) is_cause: bool,
-    /// True if it names the change of one source at a time with its value.
+    /// True if it names the difference of one source with its value.
+    pub(super) has_value: bool,
+    /// The same for a change at a time.
     pub(super) is_measured_change: bool,
 }
 
@@ -63,6 +66,7 @@ impl Statement {
             interval,
             is_isolated,
             is_cause: false,
+            has_value: false,
             is_measured_change: false,
             suspected: suspected.clone(),
         };
@@ -78,7 +82,8 @@ impl Statement {
             }
             _ => String::new(),
         };
-        statement.is_measured_change = !detail.is_empty() && interval.since_s.is_some();
+        statement.has_value = !detail.is_empty();
+        statement.is_measured_change = statement.has_value && interval.since_s.is_some();
         let names: Vec<String> = suspected.iter().map(Source::name).collect();
         statement.title = match alternatives {
             [only] => {
@@ -92,6 +97,35 @@ impl Statement {
             _ => format!("{} disagree with each other{times}", all_of(&names, "and")),
         };
         Some(statement)
+    }
+
+    /// Fault of the only sensor that is wrong, whose cause is not known; `None` for several sources, for images, whose causes a
+    /// run may find, and for ground truth.
+    pub(super) fn fault(&self) -> Option<Fault> {
+        match self.suspected.as_slice() {
+            [Source::Gyroscope | Source::Accelerometer] => Some(FaultKind::UnusableImu.into()),
+            [Source::Joint { joint, .. }] => Some(Fault::from(FaultKind::UnusableJoints).of_joints([joint])),
+            _ => None,
+        }
+    }
+
+    /// Sentence about a ground truth with inverted orientations; `misfits` are those with the gyroscope, as recorded and inverted.
+    pub(super) fn of_inverted_truth([given, inverted]: [f64; 2]) -> Self {
+        Self {
+            severity: Severity::Warning,
+            area: Area::Log,
+            title: "the orientations of the ground truth are inverted: they are body_from_world".to_owned(),
+            evidence: format!(
+                "its rotations differ from the gyroscope's by {given:.1} times the noise, inverted by {inverted:.1} times"
+            ),
+            remedy: "invert its quaternions: nav_msgs and geometry_msgs map the body to the world".to_owned(),
+            interval: FindingInterval::default(),
+            suspected: vec![Source::GroundTruth],
+            is_isolated: true,
+            is_cause: true,
+            has_value: false,
+            is_measured_change: false,
+        }
     }
 
     /// Sentence about two cameras whose images are exchanged.
@@ -112,6 +146,7 @@ impl Statement {
             suspected,
             is_isolated: true,
             is_cause: true,
+            has_value: false,
             is_measured_change: false,
         }
     }
@@ -171,8 +206,13 @@ fn detail(change: &Change, pair: &Pair, is_first: bool) -> Option<String> {
         Parameter::AxisScales => {
             let axes = ["x", "y", "z"].into_iter().zip(change.values.iter().map(|value| factor(*value)));
             let wrong = axes.filter(|(_, factor)| (factor - 1.0).abs() > WRONG_SCALE);
-            let texts: Vec<String> = wrong.map(|(axis, factor)| format!("{factor:.3} times about {axis}")).collect();
-            format!("its rotations are {} theirs", all_of(&texts, "and"))
+            let (values, along) = match pair.quantity {
+                Quantity::SpecificForce => ("specific forces", "along"),
+                Quantity::Rotation | Quantity::Direction => ("rotations", "about"),
+            };
+            let texts: Vec<String> =
+                wrong.map(|(axis, factor)| format!("{factor:.2} times theirs {along} {axis}")).collect();
+            format!("its {values} are {}", all_of(&texts, "and"))
         }
         Parameter::ForceBias => {
             let bias = vector();

@@ -151,6 +151,8 @@ pub(super) struct Findings {
     /// Places of the findings about a misfit, each with its camera or topic: causes with their faults, and without faults
     /// unexplained ones.
     misfits: BTreeMap<usize, String>,
+    /// Places of the findings by comparisons of the ground truth with the gyroscope.
+    by_truth: BTreeSet<usize>,
 }
 
 impl Findings {
@@ -216,20 +218,35 @@ impl Findings {
         findings.filter(explained).map(|(_, finding)| finding)
     }
 
+    /// Marks the finding that was added last as one by a comparison with the ground truth, which another source may exclude.
+    pub(super) fn mark_by_truth(&mut self) {
+        self.by_truth.extend(self.list.len().checked_sub(1));
+    }
+
     /// Removes and returns the findings about a misfit that are excluded.
     pub(super) fn retract_misfits(&mut self, is_excluded: impl Fn(&Finding) -> bool) -> Vec<Finding> {
-        let (mut kept, mut removed, mut misfits) = (Vec::new(), Vec::new(), BTreeMap::new());
-        for (place, finding) in std::mem::take(&mut self.list).into_iter().enumerate() {
-            let subject = self.misfits.remove(&place);
-            if subject.is_some() && is_excluded(&finding) {
-                removed.push(finding);
-            } else {
-                misfits.extend(subject.map(|subject| (kept.len(), subject)));
-                kept.push(finding);
-            }
-        }
-        (self.list, self.misfits) = (kept, misfits);
-        removed
+        let places = self.misfits.keys().copied().filter(|place| is_excluded(&self.list[*place])).collect();
+        self.retract(&places)
+    }
+
+    /// Removes and returns the findings by comparisons with the ground truth that are excluded.
+    pub(super) fn retract_by_truth(&mut self, is_excluded: impl Fn(&Finding) -> bool) -> Vec<Finding> {
+        let places = self.by_truth.iter().copied().filter(|place| is_excluded(&self.list[*place])).collect();
+        self.retract(&places)
+    }
+
+    /// Removes and returns the findings at some places.
+    fn retract(&mut self, places: &BTreeSet<usize>) -> Vec<Finding> {
+        let moved = |place: usize| place - places.range(..place).count();
+        let kept = |place: &usize| !places.contains(place);
+        self.by_truth = self.by_truth.iter().copied().filter(kept).map(moved).collect();
+        let misfits = std::mem::take(&mut self.misfits).into_iter();
+        self.misfits =
+            misfits.filter(|(place, _)| kept(place)).map(|(place, subject)| (moved(place), subject)).collect();
+        let (removed, list): (Vec<_>, Vec<_>) =
+            std::mem::take(&mut self.list).into_iter().enumerate().partition(|(place, _)| places.contains(place));
+        self.list = list.into_iter().map(|(_, finding)| finding).collect();
+        removed.into_iter().map(|(_, finding)| finding).collect()
     }
 
     /// Adds a warning about a value that is only assumed.
