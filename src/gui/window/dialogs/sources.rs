@@ -68,8 +68,9 @@ fn agreement_ui(ui: &mut Ui, ctx: &PanelContext<'_>, agreement: &Agreement) {
     }
     ui.add_space(4.0);
     let legend = format!(
-        "Numbers: misfit in units of noise and tolerance; up to {AGREES} sources agree, from {DOUBTS} on they disagree. \
-         Lanes: the same over time, with the cursor."
+        "Numbers: misfit in units of noise and tolerance, below {AGREES:.1} of sources that agree, above {DOUBTS:.1} of others. \
+         Lanes: the same over time, with the cursor. A red pair with a green lane differs by a constant, which the sentence \
+         names."
     );
     ui.add(Label::new(RichText::new(legend).color(theme.text_weak).small()).wrap());
 }
