@@ -9,7 +9,7 @@ use super::fit::{Fitted, Fitter, Predictions};
 use crate::faults::{Fault, FaultKind, LensChange};
 use crate::geometry::so3;
 use crate::log_check::rotations::data::MeasuredRotation;
-use crate::log_check::rotations::fit::{TAIL_DEGREES, tail_cost};
+use crate::log_check::rotations::fit::{RotationFit, TAIL_DEGREES, tail_cost};
 use crate::log_check::statistics::percentile;
 
 /// Quantile of the squared differences that tells their level, and the same quantile of the sum of three squared standard
@@ -37,6 +37,7 @@ struct Row {
 
 /// Rotations of a camera with the predictions of the fit without a correction.
 pub(super) struct LinearModels {
+    fit: RotationFit,
     rows: Vec<Row>,
     /// Quantile of the squared differences over its expected value, at least one: weights are relative to the misfit.
     level: f64,
@@ -46,18 +47,17 @@ pub(super) struct LinearModels {
 
 impl LinearModels {
     pub(super) fn new(fitter: &Fitter<'_>, measured: &[MeasuredRotation]) -> Option<Self> {
-        let (_, predictions) = fitter.fit_measured(measured)?;
+        let (fit, predictions) = fitter.fit_measured(measured)?;
         let rows: Vec<Row> = measured.iter().filter_map(|it| Row::of(it, &predictions)).collect();
         let squares: Vec<f64> = rows.iter().map(|row| row.square(&(row.measured - row.predicted))).collect();
         let level = (percentile(&squares, LEVEL_QUANTILE) / LEVEL_SQUARE).max(1.0);
         let given = squares.iter().map(|square| tail_cost(square / level)).sum();
-        Some(Self { rows, level, given })
+        Some(Self { fit, rows, level, given })
     }
 
     /// Fit with a focal length that varies periodically, at the period that explains most.
     pub(super) fn period_fit(&self, fitter: &Fitter<'_>) -> Option<Fitted> {
         let (first_s, last_s) = (self.rows.first()?.time_s, self.rows.last()?.time_s);
-        let rows: Vec<&Row> = self.rows.iter().collect();
         let waves = |period_s: f64| {
             move |row: &Row| {
                 let (sine, cosine) = (TAU * row.time_s / period_s).sin_cos();
@@ -68,28 +68,28 @@ impl LinearModels {
         let longest_s = LONGEST_PERIOD * (last_s - first_s);
         let periods = std::iter::successors(Some(SHORTEST_PERIOD_S), |period_s| Some(period_s * PERIOD_RATIO));
         let tried = periods.take_while(|period_s| *period_s < longest_s);
-        let costs = tried.map(|period_s| (self.cost(&rows, &waves(period_s)), period_s));
+        let costs = tried.map(|period_s| (self.cost(&waves(period_s)), period_s));
         let (_, coarse_s) = costs.min_by(|one, other| one.0.total_cmp(&other.0))?;
         let near = (-4..=4).map(|step| coarse_s * PERIOD_RATIO.powf(f64::from(step) / 4.0));
-        let costs = near.map(|period_s| (self.cost(&rows, &waves(period_s)), period_s));
+        let costs = near.map(|period_s| (self.cost(&waves(period_s)), period_s));
         let (_, period_s) = costs.min_by(|one, other| one.0.total_cmp(&other.0))?;
-        if self.cost(&rows, &waves(period_s)) + PERIOD_PARAMETERS as f64 * fitter.parameter_cost() > self.given {
+        if self.cost(&waves(period_s)) + PERIOD_PARAMETERS as f64 * fitter.parameter_cost() > self.given {
             return None;
         }
         // A focal length that changes between two images also moves features towards the edge: rotations are measured again.
-        let first = self.solution(&rows, &waves(period_s))?;
+        let first = self.solution(&waves(period_s))?;
         let mut wave = Wave { mean: first[0], sine: first[1], cosine: first[2], period_s, middle_s: 0.0 }
             .about(0.5 * (first_s + last_s));
         let mut fit = None;
         for _ in 0..MEASURED {
             let measured = fitter.with_lens_at(|time_s| LensChange { focal: wave.ratio(time_s), ..LensChange::NONE });
             let models = Self::new(fitter, &measured)?;
-            fit = Some(fitter.fit_measured(&measured)?.0);
             let columns = |row: &Row| {
                 let columns = wave.derivatives(row.time_s).map(|derivative| across(&row.predicted) * derivative);
                 Matrix3xX::from_columns(&columns)
             };
-            wave.change(&models.solution(&models.rows.iter().collect::<Vec<_>>(), &columns)?);
+            wave.change(&models.solution(&columns)?);
+            fit = Some(models.fit);
         }
         let fit = fit?;
         Some(Fitted {
@@ -99,29 +99,23 @@ impl LinearModels {
         })
     }
 
-    /// What remains of the differences of rows with the best values of a linear function.
-    fn left(&self, rows: &[&Row], columns: &dyn Fn(&Row) -> Matrix3xX<f64>) -> Vec<Vector3<f64>> {
-        let values = self.solution(rows, columns);
-        let left = |row: &&Row| {
+    /// Cost of all rows with the best values of a linear function.
+    fn cost(&self, columns: &dyn Fn(&Row) -> Matrix3xX<f64>) -> f64 {
+        let values = self.solution(columns);
+        let left = |row: &Row| {
             let change = values.as_ref().map_or_else(Vector3::zeros, |values| columns(row) * values);
             row.measured - row.predicted - change
         };
-        rows.iter().map(left).collect()
-    }
-
-    /// Cost of rows with the best values of a linear function.
-    fn cost(&self, rows: &[&Row], columns: &dyn Fn(&Row) -> Matrix3xX<f64>) -> f64 {
-        let left = self.left(rows, columns);
-        rows.iter().zip(left).map(|(row, left)| tail_cost(row.square(&left) / self.level)).sum()
+        self.rows.iter().map(|row| tail_cost(row.square(&left(row)) / self.level)).sum()
     }
 
     /// Values of a linear function of the differences, by least squares with the weights of a t distribution.
-    fn solution(&self, rows: &[&Row], columns: &dyn Fn(&Row) -> Matrix3xX<f64>) -> Option<DVector<f64>> {
-        let count = columns(rows.first()?).ncols();
+    fn solution(&self, columns: &dyn Fn(&Row) -> Matrix3xX<f64>) -> Option<DVector<f64>> {
+        let count = columns(self.rows.first()?).ncols();
         let mut values = DVector::zeros(count);
         for _ in 0..ROUNDS {
             let (mut hessian, mut gradient) = (DMatrix::identity(count, count), DVector::zeros(count));
-            for row in rows {
+            for row in &self.rows {
                 let jacobian = columns(row);
                 let difference = row.measured - row.predicted;
                 let square = row.square(&(difference - &jacobian * &values)) / self.level;

@@ -15,7 +15,7 @@ const LONGEST_ORDERED: usize = 4;
 /// Starts of a cycle that are followed, and iterations.
 const FOLLOWED: usize = 3;
 const ITERATIONS: usize = 6;
-/// Half the step of a derivative, in seconds.
+/// Step of a difference quotient, in seconds.
 const STEP_S: f64 = 2e-3;
 /// Smallest difference of the stamps of a cycle that is one, in seconds.
 const SMALLEST_S: f64 = 2e-3;
@@ -113,9 +113,8 @@ impl Cycle<'_> {
             let mut gradient = DVector::zeros(length);
             for ((places, pair), ((_, by_first), (_, by_second))) in at.iter().zip(first.iter().zip(&second)) {
                 let difference = self.difference(pair);
-                let information = (TAIL_DEGREES + 3.0)
-                    / (TAIL_DEGREES + square(pair, &difference))
-                    / (pair.covariance_rad2.trace() / 3.0).max(f64::MIN_POSITIVE);
+                let information =
+                    (TAIL_DEGREES + 3.0) / (TAIL_DEGREES + square(pair, &difference)) / variance_rad2(pair);
                 let slopes = [by_first, by_second].map(|other| (self.difference(other) - difference) / STEP_S);
                 for (end, slope) in slopes.iter().enumerate() {
                     gradient[places[end]] -= slope.dot(&difference) * information;
@@ -140,5 +139,10 @@ impl Cycle<'_> {
 
 /// Squared difference in units of the mean variance of its axes.
 fn square(pair: &RotationPair, difference: &Vector3<f64>) -> f64 {
-    difference.norm_squared() / (pair.covariance_rad2.trace() / 3.0).max(f64::MIN_POSITIVE)
+    difference.norm_squared() / variance_rad2(pair)
+}
+
+/// Mean variance of a rotation per axis.
+fn variance_rad2(pair: &RotationPair) -> f64 {
+    (pair.covariance_rad2.trace() / 3.0).max(f64::MIN_POSITIVE)
 }

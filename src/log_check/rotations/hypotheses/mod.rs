@@ -167,8 +167,8 @@ impl<'a> Comparison<'a> {
         self.fitter.criterion(&self.given, 0)
     }
 
-    /// Adds the hypotheses about intrinsics unless another one explains the misfit or none of them can: other intrinsics need
-    /// all rotations measured again; only a wrong scale of the gyroscope resembles them.
+    /// Adds the hypotheses about intrinsics unless another one explains the misfit: other intrinsics need all rotations
+    /// measured again; only a wrong scale of the gyroscope resembles them.
     fn add_intrinsics(&mut self) {
         let found = |it: &Fitted| {
             it.fit.is_explained()
