@@ -27,6 +27,7 @@ pub use self::check::check;
 pub use self::clock_alignment::{
     AlignmentError, AlignmentReference, ClockAlignment, RotationReference, align_camera, align_clocks,
 };
+pub use self::isolation::{AGREEING_MISFIT, LARGEST_MISFIT};
 pub use self::noise::{
     AllanPoint, AllanReport, AxisNoise, GivenNoise, NoiseTerm, NoiseTerms, SensorNoise, measure_noise,
 };

@@ -9,8 +9,8 @@ use crate::log_check::statistics::{median, percentile};
 
 /// Misfit in units of noise and tolerance from which two sources disagree, and the largest one of sound sources: the part
 /// before a change must agree.
-pub(super) const LARGEST_MISFIT: f64 = 1.8;
-pub(super) const AGREEING_MISFIT: f64 = 1.0;
+pub const LARGEST_MISFIT: f64 = 1.8;
+pub const AGREEING_MISFIT: f64 = 1.0;
 /// Quantile of the misfits that is compared with the same quantile of a standard normal number, as for image rotations.
 const COMPARED_QUANTILE: f64 = 0.7;
 const COMPARED_SIGMAS: f64 = 0.5244;
@@ -56,7 +56,7 @@ pub(super) enum Parameter {
     ForceBias,
     /// Position of the accelerometer in the body of the positions, in metres.
     Lever,
-    /// Ratio of the accelerations of the accelerometer to those of the positions, less one.
+    /// Ratio of the accelerations of the accelerometer to the accelerations of the positions, less one.
     PositionScale,
     /// Factor on the cross product of angular rate and velocity that is missing.
     Transport,
@@ -201,7 +201,7 @@ impl Sums {
 /// Rows with the parameters of their columns.
 pub(super) struct Comparison<'a> {
     pub(super) rows: &'a [Row],
-    /// In the order of the columns; the first ones are those of sound sources.
+    /// In the order of the columns; the first ones are parameters of sound sources.
     pub(super) parameters: &'a [Parameter],
     /// Number of parameters that sound sources have.
     pub(super) sound: usize,
@@ -253,7 +253,7 @@ impl Comparison<'_> {
         Some(Fit { constants, sigmas, misfit, by_axis, noise, bins, disagrees, change })
     }
 
-    /// Values of a further parameter beside those of sound sources, with their standard deviations for a misfit in units of
+    /// Values of a further parameter beside the parameters of sound sources, with their standard deviations for a misfit in units of
     /// the noise.
     pub(super) fn further(&self, parameter: Parameter, misfit: f64) -> Option<Vec<[f64; 2]>> {
         let columns = [self.columns(&self.parameters[..self.sound]), self.columns(&[parameter])].concat();
@@ -347,7 +347,7 @@ impl Comparison<'_> {
         Some(Step { at, change, before: first })
     }
 
-    /// Parameter beyond those of sound sources that explains a misfit of the whole log.
+    /// Parameter, not one of sound sources, that explains a misfit of the whole log.
     fn suspect(&self, sound: &[usize], weights: &[f64], square: f64) -> Option<Change> {
         let suspects = self.parameters[self.sound..].iter().filter_map(|parameter| {
             let columns = self.columns(&[*parameter]);

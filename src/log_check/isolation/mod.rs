@@ -20,7 +20,8 @@ use std::collections::BTreeSet;
 use nalgebra::UnitQuaternion;
 
 pub(super) use self::compared::Compared;
-use self::comparison::{AGREEING_MISFIT, Fit, LARGEST_MISFIT, Parameter};
+pub use self::comparison::{AGREEING_MISFIT, LARGEST_MISFIT};
+use self::comparison::{Fit, Parameter};
 use self::culprits::{Verdict, culprits};
 use self::orientations::Orientations;
 use self::pair::Pair;
@@ -157,8 +158,7 @@ impl Compared<'_> {
             (*stamp_ns, RigidTransform::new(pose.rotation.inverse(), pose.translation_m))
         };
         let inverse: Vec<(i64, RigidTransform)> = self.poses.iter().map(invert).collect();
-        let gyroscope = Orientations::all(self).into_iter().find(|it| it.source == Source::Gyroscope)?;
-        let (_, fit, _) = rotation::compare(&gyroscope, &Orientations::of_truth(&inverse)?)?;
+        let (_, fit, _) = rotation::compare(&Orientations::of_gyroscope(self), &Orientations::of_truth(&inverse)?)?;
         let is_inverse = given.fit.disagrees.is_some() && fit.disagrees.is_none() && fit.misfit < AGREEING_MISFIT;
         is_inverse.then(|| Statement::of_inverted_truth([given.fit.misfit, fit.misfit]))
     }
@@ -167,7 +167,10 @@ impl Compared<'_> {
     fn exchange(&self, suspected: &BTreeSet<&Source>, pairs: &[Pair]) -> Option<Statement> {
         let cameras: Vec<&CameraRig> =
             self.rig.cameras.iter().filter(|camera| suspected.contains(&images_of(camera))).collect();
-        let gyroscope = Orientations::all(self).into_iter().find(|it| it.source == Source::Gyroscope)?;
+        if cameras.len() < 2 {
+            return None;
+        }
+        let gyroscope = Orientations::of_gyroscope(self);
         let misfits = |camera: &CameraRig, other: &CameraRig| {
             let own = images_of(camera);
             let given =

@@ -46,7 +46,7 @@ impl Orientations {
         found
     }
 
-    fn of_gyroscope(compared: &Compared<'_>) -> Self {
+    pub(super) fn of_gyroscope(compared: &Compared<'_>) -> Self {
         let noise_rad2_per_s = compared.rig.imu.noise.gyroscope_noise_density.powi(2);
         let gyroscope = &compared.imu_facts.gyroscope;
         let node = |time_s: f64| Some((time_s, gyroscope.orientation_at(time_s)?, noise_rad2_per_s * time_s, 0.0));

@@ -5,7 +5,7 @@ use egui::{Align2, Id, Label, Pos2, Rect, RichText, ScrollArea, Sense, Stroke, S
 use crate::gui::PanelContext;
 use crate::gui::theme::{Theme, label_font, number_font};
 use crate::gui::units::capitalized;
-use crate::log_check::{Agreement, PairAgreement, Quantity};
+use crate::log_check::{AGREEING_MISFIT, Agreement, LARGEST_MISFIT, PairAgreement, Quantity};
 
 /// Place and size of the window in points at first.
 const DEFAULT_POSITION: [f32; 2] = [60.0, 110.0];
@@ -14,9 +14,6 @@ const HEIGHT: f32 = 560.0;
 /// Width of the names beside the matrix and the lanes, and size of a cell, in points.
 const NAME_WIDTH: f32 = 240.0;
 const CELL: [f32; 2] = [56.0, 24.0];
-/// Misfits in units of the noise up to which a lane shows agreement and doubt.
-const AGREES: f64 = 1.0;
-const DOUBTS: f64 = 1.8;
 
 /// Draws the window. Returns true if it stays open.
 pub(super) fn ui(ui: &Ui, ctx: &PanelContext<'_>) -> bool {
@@ -68,7 +65,7 @@ fn agreement_ui(ui: &mut Ui, ctx: &PanelContext<'_>, agreement: &Agreement) {
     }
     ui.add_space(4.0);
     let legend = format!(
-        "Numbers: misfit in units of noise and tolerance, below {AGREES:.1} of sources that agree, above {DOUBTS:.1} of others. \
+        "Numbers: misfit in units of noise and tolerance, below {AGREEING_MISFIT:.1} of sources that agree, above {LARGEST_MISFIT:.1} of others. \
          Lanes: the same over time, with the cursor. A red pair with a green lane differs by a constant, which the sentence \
          names."
     );
@@ -131,9 +128,9 @@ fn lane_ui(ui: &mut Ui, ctx: &PanelContext<'_>, theme: &Theme, pair: &PairAgreem
         painter.rect_filled(rect, 2.0, theme.plot_background);
         let half_s = pair.bins.windows(2).map(|two| 0.5 * (two[1][0] - two[0][0])).fold(0.5, f64::min);
         for [time_s, misfit] in &pair.bins {
-            let color = if *misfit < AGREES {
+            let color = if *misfit < AGREEING_MISFIT {
                 theme.ok
-            } else if *misfit < DOUBTS {
+            } else if *misfit < LARGEST_MISFIT {
                 theme.warn
             } else {
                 theme.error
