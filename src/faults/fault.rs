@@ -148,7 +148,7 @@ impl Fault {
         self.kind.row().noticeable.is_none_or(|noticeable| self.size().abs() > noticeable)
     }
 
-    /// True for a value that hardware can have: the scale of a sensor is near one, or that of another unit.
+    /// True for a value that hardware can have: the scale of a sensor is near one, or near the size of another unit.
     pub fn is_possible(&self) -> bool {
         let units: &[f64] = match self.kind {
             FaultKind::GyroscopeScale => &[1.0, DEGREE_RAD, 1.0 / DEGREE_RAD, 1e-3, 1e3],

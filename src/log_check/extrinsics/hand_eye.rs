@@ -42,7 +42,7 @@ const OTHER_MISFIT: f64 = 0.5;
 const BOUND_OFFSET_S: f64 = 0.01;
 /// Decrease of −2·ln of the likelihood by which another convention is decisive.
 const DECISIVE: f64 = 12.0;
-/// Largest ratio of the squared corrections that the chain of another convention needs to those of the rig's chain.
+/// Largest ratio of the squared corrections that the chain of another convention needs to the corrections of the rig's chain.
 const SMALLER_CHANGE: f64 = 0.25;
 
 const CALIBRATE: &str =

@@ -17,7 +17,7 @@ pub(in crate::log_check) struct Compared<'a> {
     pub(in crate::log_check) survey: &'a Survey,
     pub(in crate::log_check) rig: &'a Rig,
     pub(in crate::log_check) imu_facts: &'a ImuFacts,
-    /// Ratio of the variance of each joint's readings as measured to that of the fit to them.
+    /// Ratio of the variance of each joint's readings as measured to the variance of the fit to them.
     pub(in crate::log_check) joint_noise_ratios: Vec<f64>,
     /// Rotations between the images as measured, with their features.
     pub(in crate::log_check) images: &'a [ImageRotation],

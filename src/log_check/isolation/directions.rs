@@ -21,7 +21,7 @@ const MIN_DIRECTIONS: usize = 20;
 const OUTLIER_RATIO: f64 = 3.0;
 
 /// Times in seconds and angles in radians between the directions of a camera's motion by images and by poses whose body has
-/// the axes `body_from_imu` and whose stamps are those of the IMU less `delay_s`; empty with too few.
+/// the axes `body_from_imu` and whose stamps are stamps of the IMU less `delay_s`; empty with too few.
 pub(super) fn angles_rad(
     compared: &Compared<'_>,
     camera: &CameraRig,
