@@ -72,13 +72,33 @@ pub(crate) struct FlightLogs {
     sound: BTreeMap<Flight, (PathBuf, Rig)>,
 }
 
+/// Log with a fault.
+pub(crate) struct PlantedLog {
+    log: PathBuf,
+    rig: Rig,
+}
+
+impl PlantedLog {
+    pub(crate) fn check(&self) -> Result<CheckReport> {
+        Ok(check_log(None, &Arc::new(FlightLog::open(&self.log)?), &self.rig))
+    }
+
+    /// Copies log and rig into a folder.
+    pub(crate) fn keep(&self, folder: &Path, name: &str) -> Result<()> {
+        fs::create_dir_all(folder)?;
+        fs::copy(&self.log, folder.join(format!("{name}.mcap")))?;
+        fs::write(folder.join(format!("{name}.rig.yaml")), self.rig.to_yaml())?;
+        Ok(())
+    }
+}
+
 impl FlightLogs {
     pub(crate) fn new(folder: &Path) -> Self {
         Self { folder: folder.to_owned(), sound: BTreeMap::new() }
     }
 
-    /// Check of a case's log and rig.
-    pub(crate) fn check(&mut self, case: &Case) -> Result<CheckReport> {
+    /// Log and rig of a case.
+    pub(crate) fn planted_log(&mut self, case: &Case) -> Result<PlantedLog> {
         let flight = case.flight;
         let (sound, mut rig) = self.sound(flight)?;
         let log = match &case.fault {
@@ -89,7 +109,7 @@ impl FlightLogs {
             }
             Some(fault) => self.planted(flight, fault, &sound)?,
         };
-        Ok(check_log(None, &Arc::new(FlightLog::open(&log)?), &rig))
+        Ok(PlantedLog { log, rig })
     }
 
     fn sound(&mut self, flight: Flight) -> Result<(PathBuf, Rig)> {

@@ -3,7 +3,7 @@
 //!
 //! `cargo bench --bench faults -- --part 3/20` checks the third of twenty parts, every twentieth case, and adds its lines to
 //! `target/faults.csv` (`--csv FILE`); the printed matrix is of all lines of that file. Without `--part`, the file is new and
-//! has all cases.
+//! has all cases. `--kind KEY` checks one row of the table alone, and `--logs FOLDER` keeps the log and the rig of each case.
 
 mod cases;
 mod flights;
@@ -17,26 +17,37 @@ use std::path::PathBuf;
 
 use anyhow::{Context as _, Result, bail};
 
-use cases::{cases, left_out};
+use cases::{Case, cases, left_out};
+use dcvins::faults::{FaultKind, TABLE};
 use flights::{Flight, FlightLogs};
 use matrix::{HEADER, Matrix};
 
 struct Arguments {
     /// Number of the part from 1 on, and of parts.
     part: Option<(usize, usize)>,
+    /// The only row that is checked.
+    kind: Option<FaultKind>,
+    /// Folder in which the logs are kept.
+    logs: Option<PathBuf>,
     csv: PathBuf,
 }
 
 impl Arguments {
     fn read(mut words: impl Iterator<Item = String>) -> Result<Self> {
         let csv = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("target/faults.csv");
-        let mut arguments = Self { part: None, csv };
+        let mut arguments = Self { part: None, kind: None, logs: None, csv };
         while let Some(word) = words.next() {
             let mut value = || words.next().with_context(|| format!("{word} needs a value"));
             match word.as_str() {
                 // Cargo adds it for a bench of its own.
                 "--bench" => {}
                 "--csv" => arguments.csv = value()?.into(),
+                "--logs" => arguments.logs = Some(value()?.into()),
+                "--kind" => {
+                    let key = value()?;
+                    let row = TABLE.iter().find(|row| row.key == key);
+                    arguments.kind = Some(row.with_context(|| format!("'{key}' is no row of the table"))?.kind);
+                }
                 "--part" => {
                     let text = value()?;
                     let part = text.split_once('/').and_then(|(part, of)| Some((part.parse().ok()?, of.parse().ok()?)));
@@ -60,9 +71,14 @@ fn main() -> Result<()> {
     }
     let mut csv = OpenOptions::new().append(true).open(&arguments.csv)?;
     let (part, of) = arguments.part.unwrap_or((1, 1));
-    for case in cases(&Flight::ALL)?.iter().skip(part - 1).step_by(of) {
-        let report = logs.check(case)?;
-        writeln!(csv, "{}", matrix::line(case, &report))?;
+    let is_chosen = |case: &&Case| arguments.kind.is_none() || arguments.kind == case.fault.as_ref().map(|it| it.kind);
+    let all = cases(&Flight::ALL)?;
+    for (number, case) in all.iter().skip(part - 1).step_by(of).filter(is_chosen).enumerate() {
+        let planted = logs.planted_log(case)?;
+        if let Some(folder) = &arguments.logs {
+            planted.keep(folder, &format!("{number:03}"))?;
+        }
+        writeln!(csv, "{}", matrix::line(case, &planted.check()?))?;
     }
     println!("{}", Matrix::of(&fs::read_to_string(&arguments.csv)?));
     for (key, reason) in left_out() {

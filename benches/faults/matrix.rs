@@ -45,13 +45,14 @@ pub(crate) fn line(case: &Case, report: &CheckReport) -> String {
     fields.join(",")
 }
 
-/// True if the named fault is the planted one or a kind that contains it. A zoom is a focal length in pieces too, and a mount
-/// that is wrong from the start is the rig's extrinsics.
+/// True if the named fault is the planted one or a kind that contains it. A zoom is a focal length in pieces too, one from the
+/// start on is another focal length, and a mount that is wrong from the start is the rig's extrinsics.
 fn is_named(planted: &Fault, named: &Fault) -> bool {
     let pair = (planted.kind, named.kind);
     planted.kind == named.kind
         || named.kind.contains(planted.kind)
         || matches!(pair, (FaultKind::Zoom, FaultKind::FocalPieces) | (FaultKind::Mount, FaultKind::Chain))
+        || (planted.since_s.is_none() && pair == (FaultKind::Zoom, FaultKind::Focal))
 }
 
 /// Confusion matrix of the lines of a CSV file.
