@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use nalgebra::{UnitQuaternion, Vector2, Vector3};
+use nalgebra::{UnitQuaternion, UnitVector3, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::table::{Change, FaultKind, LONGEST_SHIFT_S, Parameter, Part};
@@ -51,6 +51,17 @@ pub enum ImageFlip {
     Flipped,
     /// Rotated by 180°.
     UpsideDown,
+}
+
+impl ImageFlip {
+    /// Axis about which the rotations of the images are rotated by 180°, camera frame (x right, y down).
+    pub fn axis(self) -> UnitVector3<f64> {
+        match self {
+            Self::Mirrored => Vector3::x_axis(),
+            Self::Flipped => Vector3::y_axis(),
+            Self::UpsideDown => Vector3::z_axis(),
+        }
+    }
 }
 
 impl Named for ImageFlip {
@@ -121,12 +132,15 @@ impl Fault {
         if let Some(Choice::Axes(axes)) = self.choice { Some(axes) } else { None }
     }
 
-    /// Rotation of the mount of a camera against its orientation by the rig, camera frame.
+    /// Rotation of the mount of a camera against its orientation by the rig, camera frame. Images that are mirrored or
+    /// upside down rotate like the images of a camera that is rotated by 180°: rotations are axial vectors.
     pub fn mount(&self) -> UnitQuaternion<f64> {
-        if self.kind != FaultKind::Mount {
-            return UnitQuaternion::identity();
-        }
-        so3::exp(&Vector3::from_fn(|axis, _| self.value(axis)))
+        let rotation = match (self.kind, self.choice) {
+            (FaultKind::Mount, _) => Vector3::from_fn(|axis, _| self.value(axis)),
+            (FaultKind::ImageFlip, Some(Choice::Flip(flip))) => flip.axis().into_inner() * PI,
+            _ => return UnitQuaternion::identity(),
+        };
+        so3::exp(&rotation)
     }
 
     /// Size of the fault, zero without one: in the unit of its value, relative for a factor, radians for a mount.

@@ -219,6 +219,7 @@ pub const TABLE: &[Row] = &[
         .useless(0.0),
     Row::new(FaultKind::ImageFlip, "image_flip", Sensor::Camera, Area::Images)
         .corrected("image", &[Part::Flip], "mirrored|flipped|upside-down")
+        .within(&[FaultKind::Mount])
         .useless(0.0),
     Row::new(FaultKind::ImageRegion, "image_region", Sensor::Camera, Area::Images).corrected(
         "ignored",
@@ -229,7 +230,7 @@ pub const TABLE: &[Row] = &[
         .corrected("camera-shift", &[Part::Shift], "15ms")
         .fitted(&[SHIFT], &[])
         .tried(SHIFTS_S)
-        .within(&[FaultKind::Clocks])
+        .within(&[FaultKind::Clocks, FaultKind::CameraDrift])
         .useless(LONGEST_SHIFT_S),
     Row::new(FaultKind::EncoderClock, "encoder_clock", Sensor::Joints, Area::Time)
         .corrected("joint-shift", &[Part::Shift], "15ms")

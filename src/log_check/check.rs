@@ -1,6 +1,6 @@
 //! The checks in their order.
 
-use super::isolation::{Compared, isolate};
+use super::isolation::{Compared, Rotations, isolate};
 use super::report::agreement::Agreement;
 use super::report::{Area, CheckReport, Findings, ImageRotation, Severity};
 use super::survey::Survey;
@@ -38,8 +38,8 @@ pub fn check(log: &FlightLog, rig: Result<&Rig, &LogError>, image_rotations: &[I
     }
     stamps::check_timing(&survey, rig.ok(), &mut findings);
     imu::unmeasured::check_orientation_topics(log, rig, &mut findings);
-    let imu_facts = imu::check_imu(&survey, rig.ok(), &mut findings);
-    imu::axes::check_imu_axes(&imu_facts, &mut findings);
+    let mut imu_facts = imu::check_imu(&survey, rig.ok(), &mut findings);
+    imu_facts.axes_agree = imu::axes::check_imu_axes(&imu_facts, &mut findings);
     let mut proposed_masks = Vec::new();
     let mut agreement = Agreement::default();
     if let Ok(rig) = rig {
@@ -57,21 +57,25 @@ pub fn check(log: &FlightLog, rig: Result<&Rig, &LogError>, image_rotations: &[I
         images::check_images(log, &survey, rig, &imu_facts, &content_faults, &mut findings);
         stamps::copies::check_image_copies(&survey, rig, &imu_facts, &mut findings);
         gimbal::frozen_joints::check_frozen_joints(&survey, rig, &imu_facts, &mut findings);
-        let rotations = extrinsics::check_rotations(&survey, rig, &imu_facts, image_rotations, &mut findings);
-        gimbal::gimbal_imu::check_gimbal_imu(&survey, rig, image_rotations, &mut findings);
         ground_truth::check_unusable_poses(log, rig, &mut findings);
         let poses = ground_truth::poses_of(log, rig);
-        ground_truth::check_ground_truth(&poses, rig, &imu_facts, &rotations.of_imu, &mut findings);
+        let cameras = extrinsics::camera_rotations(&survey, rig, &imu_facts, image_rotations);
         let compared = Compared {
             survey: &survey,
             rig,
             imu_facts: &imu_facts,
             joint_noise_ratios: survey.joint_noise_ratios(),
             images: image_rotations,
-            measured: &rotations.measured,
+            measured: &extrinsics::measured_of(&cameras),
             poses: &poses,
         };
-        agreement = isolate(&compared, &mut findings);
+        // Causes are searched among the faults of the sources that are wrong.
+        let rotations = Rotations::of(&compared);
+        let suspects = |camera_key: &str| rotations.suspects(&compared, camera_key);
+        let of_imu = extrinsics::check_rotations(cameras, suspects, &mut findings);
+        gimbal::gimbal_imu::check_gimbal_imu(&survey, rig, image_rotations, &mut findings);
+        ground_truth::check_ground_truth(&poses, rig, &imu_facts, &of_imu, &mut findings);
+        agreement = isolate(&compared, rotations, &mut findings);
         proposed_masks = images::still_pixels::check_still_pixels(&survey, rig, image_rotations, &mut findings);
     }
     let mut findings = findings.list;

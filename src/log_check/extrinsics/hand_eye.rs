@@ -12,6 +12,7 @@ use crate::log_check::clock_alignment::{
     ClockAlignment, OFFSET_TOLERANCE_S, ORIENTATION_TOLERANCE_RAD, RotationReference, SCALE_SIGMA, SCALE_TOLERANCE,
     align_clocks,
 };
+use crate::log_check::report::suspects::Suspects;
 use crate::log_check::report::verdict::MOST_LIKELY;
 use crate::log_check::report::{Area, Findings, ImageRotation, Measurement, Severity};
 use crate::log_check::rotations::data::{JOINED_S, RotationData, joined};
@@ -52,6 +53,8 @@ const CALIBRATE: &str =
 struct HandEye<'a> {
     data: RotationData<'a>,
     camera: &'a CameraRig,
+    /// Sensors that may be the cause of a misfit.
+    suspects: &'a Suspects,
 }
 
 /// Chain by another convention than the rig's.
@@ -75,8 +78,13 @@ pub(super) enum HandEyeOutcome {
     Other,
 }
 
-/// Checks orientation and time offset of a camera by its image rotations, if there are any. A misfit beyond the noise is traced to its cause.
-pub(super) fn check_against_gyroscope(data: RotationData<'_>, findings: &mut Findings) -> HandEyeOutcome {
+/// Checks orientation and time offset of a camera by its image rotations, if there are any. A misfit beyond the noise is traced to
+/// its cause, a fault of one of the suspects.
+pub(super) fn check_against_gyroscope(
+    data: RotationData<'_>,
+    suspects: &Suspects,
+    findings: &mut Findings,
+) -> HandEyeOutcome {
     let RotationData { rig, camera, .. } = data;
     let chain = rig.chain_of_camera(&camera.key).filter(|_| data.measured.len() >= MIN_ROTATIONS);
     let Some(chain) = chain else { return HandEyeOutcome::Other };
@@ -93,7 +101,7 @@ pub(super) fn check_against_gyroscope(data: RotationData<'_>, findings: &mut Fin
         findings.add(Severity::Note, Area::Extrinsics, title, evidence, "check again when it is corrected");
         return HandEyeOutcome::Other;
     }
-    let hand_eye = HandEye { data, camera };
+    let hand_eye = HandEye { data, camera, suspects };
     let given = hand_eye.pairs(&chain, 0.0, 0.0);
     let angles_rad: Vec<f64> = given.iter().map(|pair| pair.measured.norm()).collect();
     let rotation_rad = median(&angles_rad);
@@ -122,8 +130,9 @@ pub(super) fn check_against_gyroscope(data: RotationData<'_>, findings: &mut Fin
     let is_scaled = chain.links.is_empty()
         && (fit.scale - 1.0).abs() > SCALE_TOLERANCE.max(SIGNIFICANT_SIGMAS * fit.orientation_sigma_rad);
     let is_explained = fit.is_explained() && longer.is_none_or(|longer| longer.is_explained()) && !is_scaled;
-    let within_noise = is_explained
-        .then(|| hypotheses::explain_within_noise(&hand_eye.data.delayed(offset_s), &chain, tolerance_rad(&fit)));
+    let within_noise = is_explained.then(|| {
+        hypotheses::explain_within_noise(&hand_eye.data.delayed(offset_s), &chain, suspects, tolerance_rad(&fit))
+    });
     // A fault in a part of the log also changes the time offset that fits best.
     let is_sound = within_noise.as_ref().is_some_and(|found| found.decisive.is_none());
     hand_eye.report_time_offset(aligned, is_sound, findings);
@@ -183,6 +192,7 @@ impl HandEye<'_> {
             let Sentence { severity, statement, remedy } = subject.sentence(&fault);
             findings.add(severity, Area::Time, statement, evidence, remedy);
             findings.state_faults([fault]);
+            findings.mark_by_pair(&[Measurement::Gyroscope]);
         } else {
             let title = format!("no time offset of {key} explains its rotations");
             findings.add(Severity::Note, Area::Time, title, evidence, "see the finding on its orientation");
@@ -235,7 +245,7 @@ impl HandEye<'_> {
                 "no orientation, no time offset and none of the causes that are tried explains it: check intrinsics, shutter, \
                  and axes, signs and units of the IMU"
             };
-            let explanation = hypotheses::explain(&self.data, chain, tolerance_rad);
+            let explanation = hypotheses::explain(&self.data, chain, self.suspects, tolerance_rad);
             explanation.report(key, &evidence, remedy, findings);
             if explanation.is_of(Area::Intrinsics) {
                 return HandEyeOutcome::WrongIntrinsics;
@@ -285,12 +295,15 @@ impl HandEye<'_> {
         let causes = &found.instead_of_orientation;
         let mut titles: Vec<&str> = causes.iter().map(|cause| cause.sentence.statement.as_str()).collect();
         let mut remedies: Vec<&str> = causes.iter().map(|cause| cause.sentence.remedy.as_str()).collect();
-        titles.insert(found.more_likely, &title);
-        remedies.insert(found.more_likely, remedy);
+        // Half a turn of a joint is less likely than images that are turned.
+        let place = if turned_images(orientation).is_some() { 0 } else { found.more_likely };
+        titles.insert(place, &title);
+        remedies.insert(place, remedy);
         findings.add(severity, Area::Extrinsics, titles.join(", or "), evidence, remedies.join("; or "));
         let kind = if turned_images(orientation).is_some() { FaultKind::ImageFlip } else { FaultKind::Chain };
-        let fault = Fault::from(kind).of_camera(key);
-        findings.state_faults(causes.iter().filter_map(|cause| cause.fault.clone()).chain([fault]));
+        let mut faults: Vec<Fault> = causes.iter().filter_map(|cause| cause.fault.clone()).collect();
+        faults.insert(place.min(faults.len()), Fault::from(kind).of_camera(key));
+        findings.state_faults(faults);
     }
 
     /// Chain of another convention that predicts the rotations much better than the rig's, with an orientation of the camera

@@ -10,6 +10,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use self::hand_eye::HandEyeOutcome;
 use super::imu::ImuFacts;
+use super::report::suspects::Suspects;
 use super::report::{Area, Findings, ImageRotation, Measurement, Severity};
 use super::rotations::data::{MeasuredRotation, RotationData};
 use super::rotations::readout::check_readout;
@@ -26,40 +27,54 @@ const UPRIGHT_ROLL_DEG: f64 = 45.0;
 /// Largest roll by the inverse matrix, in degrees, with which it counts as the right one.
 const INVERSE_ROLL_DEG: f64 = 30.0;
 
-/// Rotations of cameras for later checks.
-#[derive(Debug, Default)]
-pub(super) struct CameraRotations {
-    /// Rotations of the IMU, in its frame, that would explain the orientations of rigid cameras that differ from the rig.
-    pub(super) of_imu: Vec<UnitQuaternion<f64>>,
-    /// Rotations between the first rows of consecutive images, by camera key.
-    pub(super) measured: BTreeMap<String, Vec<MeasuredRotation>>,
+/// Rotations of a camera with the findings on its readout.
+pub(super) struct CameraRotations<'a> {
+    data: RotationData<'a>,
+    of_readout: Findings,
 }
 
-/// Checks the extrinsics of all cameras.
-pub(super) fn check_rotations(
-    survey: &Survey,
-    rig: &Rig,
-    imu_facts: &ImuFacts,
-    rotations: &[ImageRotation],
-    findings: &mut Findings,
-) -> CameraRotations {
-    let mut found = CameraRotations::default();
-    for camera in &rig.cameras {
-        check_against_gravity(survey, rig, camera, imu_facts, findings);
-        check_lever(camera, findings);
+/// Rotations of all cameras between the first rows of consecutive images.
+pub(super) fn camera_rotations<'a>(
+    survey: &'a Survey,
+    rig: &'a Rig,
+    imu_facts: &'a ImuFacts,
+    rotations: &'a [ImageRotation],
+) -> Vec<CameraRotations<'a>> {
+    let of_camera = |camera| {
         let mut of_readout = Findings::default();
         let readout_s = check_readout(rig, camera, imu_facts, rotations, &mut of_readout);
         let data = RotationData::new(survey, rig, imu_facts, camera, rotations, readout_s);
-        found.measured.insert(camera.key.clone(), data.measured.clone());
-        match hand_eye::check_against_gyroscope(data, findings) {
+        CameraRotations { data, of_readout }
+    };
+    rig.cameras.iter().map(of_camera).collect()
+}
+
+/// Those rotations by camera key.
+pub(super) fn measured_of(cameras: &[CameraRotations<'_>]) -> BTreeMap<String, Vec<MeasuredRotation>> {
+    cameras.iter().map(|it| (it.data.camera.key.clone(), it.data.measured.clone())).collect()
+}
+
+/// Checks the extrinsics of all cameras; `suspects` are the sensors that may be the cause of the misfit of a camera with a key.
+/// Returns rotations of the IMU, in its frame, that would explain the orientations of rigid cameras that differ from the rig.
+pub(super) fn check_rotations(
+    cameras: Vec<CameraRotations<'_>>,
+    suspects: impl Fn(&str) -> Suspects,
+    findings: &mut Findings,
+) -> Vec<UnitQuaternion<f64>> {
+    let mut of_imu = Vec::new();
+    for CameraRotations { data, mut of_readout } in cameras {
+        let RotationData { survey, rig, imu_facts, camera, .. } = data;
+        check_against_gravity(survey, rig, camera, imu_facts, findings);
+        check_lever(camera, findings);
+        match hand_eye::check_against_gyroscope(data, &suspects(&camera.key), findings) {
             // By a wrong lens, features move faster in one half of the image, as by a rolling shutter.
             HandEyeOutcome::WrongIntrinsics => continue,
-            HandEyeOutcome::OtherOrientation(rotation) => found.of_imu.push(rotation),
+            HandEyeOutcome::OtherOrientation(rotation) => of_imu.push(rotation),
             HandEyeOutcome::Other => {}
         }
         findings.list.append(&mut of_readout.list);
     }
-    found
+    of_imu
 }
 
 /// `imu_from_camera` at a time, with the measured joint angles for a gimbal camera.

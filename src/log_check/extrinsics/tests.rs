@@ -280,6 +280,16 @@ fn faults_within_the_noise_of_single_rotations_are_named() {
 }
 
 #[test]
+fn faults_that_begin_at_a_time_are_named() {
+    let mount = |time_s: f64| if time_s < 6.0 { Vector3::zeros() } else { Vector3::new(PI, 0.0, 0.0) };
+    let mirrored = Images { mount, ..Images::default() }.check(&Flight::default());
+    expect(&mirrored, Severity::Error, &["the images of cam0 are mirrored", "from about 6.0 s on"]);
+    let reversed = |time_s: f64| if time_s < 6.0 { joint_at(time_s) } else { -joint_at(time_s) };
+    let report = Images { joint: Some(reversed), ..Images::default() }.check(&on_gimbal());
+    expect(&report, Severity::Error, &["joint 'yaw' counts in the other direction", "from about 5.8 s on"]);
+}
+
+#[test]
 fn units_of_joint_angles_are_named() {
     let of = |joint: fn(i64, &mut f64)| {
         let images = Images { joint: Some(joint_at), ..Images::default() };

@@ -6,13 +6,14 @@ mod placed_forces;
 use nalgebra::{UnitQuaternion, Vector3};
 
 pub(super) use self::placed_forces::{HALF_VELOCITY_NS, around};
-use self::placed_forces::{PlacedForces, velocity_at};
+use self::placed_forces::{OtherAxes, PlacedForces, velocity_at};
 use super::clock_alignment::{
     AlignmentError, ClockAlignment, ORIENTATION_TOLERANCE_RAD, RotationReference, SCALE_TOLERANCE, align_clocks,
 };
 use super::imu::{ImuFacts, LARGEST_BIAS_M_PER_S2};
 use super::report::{Area, Findings, ImageRotation, Measurement, Severity};
 use super::statistics::median;
+use super::survey::held::Held;
 use crate::faults::{Fault, FaultKind};
 use crate::flight_log::log::relative_ns;
 use crate::flight_log::stamps::spacing::Spacing;
@@ -109,6 +110,9 @@ pub(super) fn check_ground_truth(
     if imu_facts.samples.is_empty() || truth.poses.is_empty() {
         return;
     }
+    if let Some(held) = Held::of(poses) {
+        held.report(Area::Log, "the ground truth", "holds its", findings);
+    }
     // Stamps of a batch are late by up to its length.
     let stamps = imu_facts.samples.iter().map(|sample| sample.stamp_ns);
     let batches = Spacing::of(stamps, Some(rig.imu.rate_hz)).batches;
@@ -141,10 +145,14 @@ impl GroundTruth<'_> {
             }
             Ok(found) => {
                 self.report_clock(&found, imu_delay_s, findings);
-                report_body(&found, rotations_of_imu, findings);
                 let placed = PlacedForces { poses: self.poses, clock: &found, samples: &imu_facts.samples };
-                if findings.can_compare(Measurement::Accelerometer) && !placed.report_axes(findings) {
-                    self.report_world(&found, imu_facts, findings);
+                let can_compare = findings.can_compare(Measurement::Accelerometer);
+                let of_forces = if can_compare { placed.other_axes() } else { None };
+                let is_of_gyroscope = report_body(&found, rotations_of_imu, of_forces.as_ref(), findings);
+                match of_forces {
+                    Some(other) if !is_of_gyroscope => other.report(findings),
+                    None if can_compare => self.report_world(&found, imu_facts, findings),
+                    _ => {}
                 }
             }
             Err(error) => report_failure(&error, findings),
@@ -204,7 +212,7 @@ impl GroundTruth<'_> {
             "add {offset_s:+.3} s to its stamps before errors against it are used; position errors contain this delay"
         );
         findings.add(Severity::Warning, Area::Time, title, evidence, remedy);
-        findings.mark_by_truth();
+        findings.mark_by_pair(&[Measurement::Gyroscope]);
     }
 
     /// Compares the direction of the mean specific force in the world of the ground truth with the vertical (z up).
@@ -245,6 +253,7 @@ impl GroundTruth<'_> {
             (format!("the world of the ground truth is tilted by {degrees:.1}° against gravity"), remedy)
         };
         findings.add(Severity::Warning, Area::Log, title, evidence, remedy);
+        findings.mark_by_pair(&[Measurement::Gyroscope, Measurement::Accelerometer]);
     }
 
     /// Mean specific force in the world of the ground truth, with the mean acceleration by its positions, in m/s².
@@ -282,7 +291,8 @@ fn report_left_handed(reversed: &ClockAlignment, given: Option<&ClockAlignment>,
     let title = "the axes of the gyroscope form a left-handed frame, by the ground truth";
     let remedy = "correct order and signs of the axes in the IMU's driver, of gyroscope and accelerometer alike";
     findings.add(Severity::Error, Area::Imu, title, evidence, remedy);
-    findings.mark_by_truth();
+    findings.state_faults([Fault::from(FaultKind::GyroscopeAxes)]);
+    findings.mark_by_pair(&[Measurement::Gyroscope]);
 }
 
 fn report_failure(error: &AlignmentError, findings: &mut Findings) {
@@ -299,7 +309,14 @@ fn report_failure(error: &AlignmentError, findings: &mut Findings) {
     findings.add(Severity::Note, Area::Log, title, error.to_string(), "");
 }
 
-fn report_body(found: &ClockAlignment, rotations_of_imu: &[UnitQuaternion<f64>], findings: &mut Findings) {
+/// Reports the rotation of the ground truth's body against the IMU, and the scale of the gyroscope. True if the gyroscope's axes
+/// alone are other ones than the rig's, by which the accelerometer's seem to be other ones, too.
+fn report_body(
+    found: &ClockAlignment,
+    rotations_of_imu: &[UnitQuaternion<f64>],
+    of_forces: Option<&OtherAxes>,
+    findings: &mut Findings,
+) -> bool {
     let body_from_imu = so3::exp(&Vector3::from(found.camera_from_body_rad));
     let angle_rad = body_from_imu.angle();
     // Each rotation measures two axes; the misfit of one is averaged over all.
@@ -315,7 +332,8 @@ fn report_body(found: &ClockAlignment, rotations_of_imu: &[UnitQuaternion<f64>],
         let title = format!("the gyroscope measures {:.2} times the rotation of the ground truth", 1.0 / found.scale);
         let remedy = "check unit and range setting of the gyroscope, or imu0's scale factors in the rig";
         findings.add(Severity::Warning, Area::Imu, title, evidence.clone(), remedy);
-        findings.mark_by_truth();
+        findings.state_faults([Fault::new(FaultKind::GyroscopeScale, &[found.scale])]);
+        findings.mark_by_pair(&[Measurement::Gyroscope]);
     }
     if angle_rad > BODY_TOLERANCE_RAD.max(SIGNIFICANT_SIGMAS * sigma_rad) {
         let vector = so3::log(&body_from_imu).map(f64::to_degrees);
@@ -326,21 +344,27 @@ fn report_body(found: &ClockAlignment, rotations_of_imu: &[UnitQuaternion<f64>],
         let turned = format!("rotated by {:.1}°", angle_rad.to_degrees());
         let is_same = |rotation: &UnitQuaternion<f64>| rotation.angle_to(&body_from_imu) < ORIENTATION_TOLERANCE_RAD;
         if !rotations_of_imu.is_empty() && rotations_of_imu.iter().all(is_same) {
-            let title = format!("the axes of the IMU are not those of the rig: {turned}");
+            let axes = SignedAxes::nearest(&body_from_imu.to_rotation_matrix().into_inner());
+            let is_of_gyroscope = of_forces.is_some() && of_forces.map(|it| it.axes) == axes.map(|axes| axes.inverse());
+            let (sensor, kind) =
+                if is_of_gyroscope { ("gyroscope", FaultKind::GyroscopeAxes) } else { ("IMU", FaultKind::ImuAxes) };
+            let title = format!("the axes of the {sensor} are not those of the rig: {turned}");
             let evidence = format!("ground truth and cameras agree with each other: {evidence}");
             let remedy = "publish the IMU in the axes of the calibration, or calibrate the extrinsics of all cameras with \
                           the axes that it has";
             findings.add(Severity::Error, Area::Imu, title, evidence, remedy);
-            let axes = SignedAxes::nearest(&body_from_imu.to_rotation_matrix().into_inner());
-            return findings.state_faults(axes.map(|axes| Fault::of_axes(FaultKind::GyroscopeAxes, axes)));
+            findings.state_faults(axes.map(|axes| Fault::of_axes(kind, axes)));
+            return is_of_gyroscope;
         }
         let title = format!("the ground truth is of another body frame: {turned}");
         let remedy = "publish the pose of the IMU: attitude errors and NEES contain this rotation, and position errors the \
                       distance between both origins";
         findings.add(Severity::Warning, Area::Log, title, evidence, remedy);
+        findings.mark_by_pair(&[Measurement::Gyroscope]);
     } else if !off_scale {
         findings.good(Area::Log, "the ground truth is of the IMU's axes", evidence);
     }
+    false
 }
 
 #[cfg(test)]

@@ -42,13 +42,35 @@ impl Window {
     }
 }
 
+/// Axes of the accelerometer that fit the accelerations of the ground truth.
+pub(super) struct OtherAxes {
+    /// Maps specific forces to the axes of the gyroscope.
+    pub(super) axes: SignedAxes,
+    evidence: String,
+}
+
+impl OtherAxes {
+    pub(super) fn report(self, findings: &mut Findings) {
+        let (title, remedy) = if self.axes.negated().is_identity() {
+            let remedy = "reverse all three axes in the driver: at rest an accelerometer measures +9.81 m/s² upwards";
+            ("the accelerometer has the opposite sign: it measures gravity, not specific force".to_owned(), remedy)
+        } else {
+            (other_accelerometer_axes(&self.axes.inverse()), CORRECT_AXES)
+        };
+        findings.add(Severity::Error, Area::Imu, title, self.evidence, remedy);
+        findings.state_faults([Fault::of_axes(FaultKind::AccelerometerAxes, self.axes)]);
+        findings.mark_by_pair(&[Measurement::Gyroscope, Measurement::Accelerometer]);
+        findings.exclude(Measurement::Accelerometer);
+    }
+}
+
 impl PlacedForces<'_> {
-    /// Reports axes or a sign of the accelerometer that fit the accelerations of the ground truth much better than the
-    /// gyroscope's; returns true if it does.
-    pub(super) fn report_axes(&self, findings: &mut Findings) -> bool {
+    /// Axes or a sign of the accelerometer that fit the accelerations of the ground truth much better than the gyroscope's; `None`
+    /// if these fit.
+    pub(super) fn other_axes(&self) -> Option<OtherAxes> {
         let windows = self.windows();
         if windows.len() < MIN_WINDOWS {
-            return false;
+            return None;
         }
         // Gravity and bias are constant.
         let scatter = |of: &dyn Fn(&Window) -> Vector3<f64>| {
@@ -61,17 +83,11 @@ impl PlacedForces<'_> {
         };
         let all: Vec<(SignedAxes, f64)> = SignedAxes::all().map(|axes| (axes, remainder(&axes))).collect();
         let given = all.iter().find(|(axes, _)| axes.is_identity()).map_or(f64::INFINITY, |(_, scatter)| *scatter);
-        let Some((axes, best)) = all.into_iter().min_by(|a, b| a.1.total_cmp(&b.1)) else { return false };
+        let (axes, best) = all.into_iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
         let is_decisive = fits_decisively(windows.len(), best, given);
         if axes.is_identity() || !is_decisive || best > LARGEST_REMAINDER * moved {
-            return false;
+            return None;
         }
-        let (title, remedy) = if axes.negated().is_identity() {
-            let remedy = "reverse all three axes in the driver: at rest an accelerometer measures +9.81 m/s² upwards";
-            ("the accelerometer has the opposite sign: it measures gravity, not specific force".to_owned(), remedy)
-        } else {
-            (other_accelerometer_axes(&axes.inverse()), CORRECT_AXES)
-        };
         let evidence = format!(
             "{} windows of {:.2} s: specific forces differ from the accelerations of the ground truth by {:.2} m/s² (RMS \
              without their mean), by {:.2} m/s² with these axes; the accelerations scatter by {:.2} m/s²",
@@ -81,10 +97,7 @@ impl PlacedForces<'_> {
             best.sqrt(),
             moved.sqrt()
         );
-        findings.add(Severity::Error, Area::Imu, title, evidence, remedy);
-        findings.state_faults([Fault::of_axes(FaultKind::AccelerometerAxes, axes)]);
-        findings.exclude(Measurement::Accelerometer);
-        true
+        Some(OtherAxes { axes, evidence })
     }
 
     fn windows(&self) -> Vec<Window> {

@@ -42,16 +42,16 @@ struct Assumed {
     scatter: f64,
 }
 
-/// Compares the axes of both sensors of the IMU.
-pub(crate) fn check_imu_axes(imu_facts: &ImuFacts, findings: &mut Findings) {
+/// Compares the axes of both sensors of the IMU; true if they agree.
+pub(crate) fn check_imu_axes(imu_facts: &ImuFacts, findings: &mut Findings) -> bool {
     if !findings.can_compare(Measurement::Gyroscope) || !findings.can_compare(Measurement::Accelerometer) {
-        return;
+        return false;
     }
     let windows = windows(&imu_facts.samples);
     let square = windows.iter().map(|(_, force)| force.norm_squared()).sum::<f64>() / windows.len().max(1) as f64;
     let tilt = scatter(&windows) / square;
     if windows.len() < MIN_WINDOWS || tilt.is_nan() || tilt < MIN_TILT {
-        return;
+        return false;
     }
     let mut all = Vec::new();
     for sign in [1.0, -1.0] {
@@ -64,8 +64,8 @@ pub(crate) fn check_imu_axes(imu_facts: &ImuFacts, findings: &mut Findings) {
             all.push(Assumed { sign, axes, scatter: scatter(&fixed) / square });
         }
     }
-    let Some(given) = all.first().copied() else { return };
-    let Some(best) = all.iter().copied().min_by(|a, b| a.scatter.total_cmp(&b.scatter)) else { return };
+    let Some(given) = all.first().copied() else { return false };
+    let Some(best) = all.iter().copied().min_by(|a, b| a.scatter.total_cmp(&b.scatter)) else { return false };
     let degrees = |assumed: Assumed| assumed.scatter.sqrt().to_degrees();
     let evidence = format!(
         "specific force rotated by the gyroscope scatters by {:.1}° around the vertical{}; in the IMU frame by {:.1}°",
@@ -80,10 +80,11 @@ pub(crate) fn check_imu_axes(imu_facts: &ImuFacts, findings: &mut Findings) {
     let is_decisive = fits_decisively(windows.len(), best.scatter, given.scatter);
     // A multirotor keeps the specific force along a body axis: then no axes make it vertical.
     if !is_decisive || best.scatter > LARGEST_SCATTER.min(LARGEST_RATIO * tilt) {
-        if given.scatter < LARGEST_SCATTER && given.scatter < tilt {
+        let agree = given.scatter < LARGEST_SCATTER && given.scatter < tilt;
+        if agree {
             findings.good(Area::Imu, "accelerometer and gyroscope have the same axes", evidence);
         }
-        return;
+        return agree;
     }
     let title = match (best.sign > 0.0, best.axes.is_identity()) {
         (true, _) => other_accelerometer_axes(&best.axes.inverse().simpler()),
@@ -96,7 +97,9 @@ pub(crate) fn check_imu_axes(imu_facts: &ImuFacts, findings: &mut Findings) {
     if best.sign > 0.0 {
         findings.state_faults([Fault::of_axes(FaultKind::AccelerometerAxes, best.axes.simpler())]);
     }
+    findings.mark_by_pair(&[Measurement::Gyroscope, Measurement::Accelerometer]);
     findings.exclude(Measurement::Accelerometer);
+    false
 }
 
 /// True if the accelerations of as many windows fit far better with a variance than with the given one.

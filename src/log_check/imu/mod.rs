@@ -1,42 +1,29 @@
 //! IMU: units, gravity, biases, noise, saturation, and the stationary intervals that show them.
 
+mod alternation;
 pub(super) mod axes;
+mod frozen;
+mod gravity;
 pub(super) mod spectrum;
 pub(super) mod stationary;
 pub(super) mod unmeasured;
 
 use nalgebra::Vector3;
 
+use self::frozen::check_frozen;
+pub(super) use self::gravity::LARGEST_BIAS_M_PER_S2;
+use self::gravity::{check_change, check_gravity};
 use self::spectrum::{Spectrum, check_noise};
 use self::stationary::{Stamped, StationaryTest, WINDOW_NS, Window};
 use self::unmeasured::check_unmeasured;
 use super::report::{Area, Findings, Measurement, Severity};
-use super::statistics::{median, middle_range};
+use super::statistics::median;
 use super::survey::Survey;
 use super::survey::held::Held;
 use crate::faults::{Fault, FaultKind};
-use crate::files::rig::read::USUAL_GRAVITY_M_PER_S2;
 use crate::geometry::{mean, seconds_from_ns};
-use crate::sensors::{AngularRates, ImuSample, Rig, STANDARD_GRAVITY_M_PER_S2};
+use crate::sensors::{AngularRates, ImuSample, Rig};
 
-/// Norm of the specific force below which it counts as unset in the message.
-const NO_FORCE_M_PER_S2: f64 = 0.01;
-/// Ratio of the specific force to gravity below which it does not contain gravity.
-const NO_GRAVITY_RATIO: f64 = 0.3;
-/// Factors by which a wrong range setting changes measurements.
-const RANGE_FACTORS: [f64; 4] = [0.25, 0.5, 2.0, 4.0];
-/// Relative error of the norm within which one of [`RANGE_FACTORS`] counts as found.
-const RANGE_TOLERANCE: f64 = 0.03;
-/// Bias of an accelerometer that is tolerated.
-pub(super) const LARGEST_BIAS_M_PER_S2: f64 = 0.3;
-/// Gravities of a rig that are usual, in m/s²: on the ground it lies between 9.78 and 9.83.
-const USUAL_GRAVITIES: std::ops::RangeInclusive<f64> = 9.75..=9.85;
-/// Difference of a norm from 1 within which it is gravity in g.
-const UNIT_TOLERANCE: f64 = 0.2;
-/// Differences of the measured norm from gravity, in m/s², from which they are noted, a warning and an error.
-const GRAVITY_TOLERANCES: [f64; 3] = [0.2, 1.0, 2.0];
-/// Largest range of the middle 80 % of the norms, as a ratio of their median, of forces that contain gravity.
-const STEADY_RANGE: f64 = 0.5;
 /// Bias of a gyroscope that is noted.
 const LARGE_BIAS_RAD_PER_S: f64 = 0.03;
 /// Minimum number of samples of a checked IMU.
@@ -76,6 +63,8 @@ pub(super) struct ImuFacts {
     /// Time and mean specific force (IMU frame, m/s²) of a stationary window; without one, the middle and the mean of
     /// the log. The vector points up.
     pub(super) up: Option<(i64, Vector3<f64>)>,
+    /// True if a comparison shows that both sensors have the same axes.
+    pub(super) axes_agree: bool,
 }
 
 /// Checks units, gravity, biases, noise and saturation of the IMU, and finds stationary periods.
@@ -99,10 +88,20 @@ pub(super) fn check_imu(survey: &Survey, rig: Option<&Rig>, findings: &mut Findi
     let others: Vec<&String> =
         survey.imu_topics.iter().filter(|topic| survey.imu_topic.as_ref() != Some(*topic)).collect();
     check_gravity(&samples, &stationary, rig, &others, findings);
+    if let Some(rig) = rig {
+        check_change(&windows, rig, findings);
+    }
     let gyroscope_bias = check_gyroscope_bias(&stationary, findings);
     if !check_held(&rates, &forces, findings) {
         check_repeated(&samples, findings);
+        let sensors = [(&rates, Measurement::Gyroscope), (&forces, Measurement::Accelerometer)];
+        for (sensor, (samples, measurement)) in sensors.into_iter().enumerate() {
+            if alternation::check_alternation(samples, sensor, findings) {
+                findings.exclude(measurement);
+            }
+        }
     }
+    check_frozen(&rates, &forces, findings);
     check_clipping(&samples, findings);
     check_noise(&spectra, rig, findings);
     check_stationary(&windows, findings);
@@ -114,7 +113,7 @@ pub(super) fn check_imu(survey: &Survey, rig: Option<&Rig>, findings: &mut Findi
     let bias = gyroscope_bias.unwrap_or_default();
     let unbiased = rates.iter().map(|(stamp_ns, rate)| (seconds_from_ns(*stamp_ns), rate - bias));
     let gyroscope = AngularRates::new(unbiased).bridging_gaps();
-    ImuFacts { samples, gyroscope, gyroscope_bias_rad_per_s: gyroscope_bias, up: Some(up) }
+    ImuFacts { samples, gyroscope, gyroscope_bias_rad_per_s: gyroscope_bias, up: Some(up), axes_agree: false }
 }
 
 /// Windows of a log from its angular rates and specific forces, both ordered by stamp.
@@ -132,110 +131,6 @@ fn windows_of(rates: &[Stamped], forces: &[Stamped], spectra: &[Option<Spectrum>
         begin = end;
     }
     windows
-}
-
-fn check_gravity(
-    samples: &[ImuSample],
-    stationary: &[Window],
-    rig: Option<&Rig>,
-    other_topics: &[&String],
-    findings: &mut Findings,
-) {
-    let gravity = rig.map_or(USUAL_GRAVITY_M_PER_S2, |rig| rig.gravity_m_per_s2);
-    if !USUAL_GRAVITIES.contains(&gravity) {
-        let evidence = format!("{gravity} m/s²; on the ground it lies between 9.78 and 9.83");
-        findings.add(
-            Severity::Warning,
-            Area::Imu,
-            "the rig's gravity is unusual",
-            evidence,
-            "set gravity for the place of the flight",
-        );
-    }
-    let (measured, when) = if stationary.is_empty() {
-        // If start and end velocity are equal, the mean specific force is gravity, measured in a tilting frame.
-        let norms: Vec<f64> = samples.iter().map(|sample| sample.specific_force_m_per_s2.norm()).collect();
-        (median(&norms), "median over the flight")
-    } else {
-        let norms: Vec<f64> = stationary.iter().map(|window| window.mean_force.norm()).collect();
-        (median(&norms), "while stationary")
-    };
-    let difference = measured - gravity;
-    let evidence = format!("|a| is {measured:.3} m/s² {when}, gravity {gravity:.3}: {difference:+.3} m/s²");
-    if measured < NO_FORCE_M_PER_S2 {
-        findings.exclude(Measurement::Accelerometer);
-        let quoted: Vec<String> = other_topics.iter().map(|topic| format!("'{topic}'")).collect();
-        let remedy = if quoted.is_empty() {
-            "record the accelerometer, too".to_owned()
-        } else {
-            format!("name the accelerometer's topic in imu0.accelerometer_rostopic: one of {}", quoted.join(", "))
-        };
-        return findings.add(
-            Severity::Error,
-            Area::Imu,
-            "the IMU's messages have no specific force",
-            evidence,
-            &remedy,
-        );
-    }
-    let is_steady = stationary.is_empty() && has_steady_norm(samples);
-    let near = |factor: &f64| {
-        let expected = factor * gravity;
-        (measured - expected).abs() < LARGEST_BIAS_M_PER_S2.max(RANGE_TOLERANCE * expected)
-    };
-    let [noted, large, unusable] = GRAVITY_TOLERANCES;
-    let range_factor = RANGE_FACTORS.into_iter().find(near);
-    let multiple = format!("the accelerometer measures {} times gravity", range_factor.unwrap_or(1.0));
-    let is_scaled = is_steady || !stationary.is_empty();
-    let (severity, title, remedy, fault) = if (measured - 1.0).abs() < UNIT_TOLERANCE && is_scaled {
-        (
-            Severity::Error,
-            "accelerations are in g, not m/s²",
-            "multiply by 9.80665 in the driver: sensor_msgs/Imu requires m/s²",
-            Some(Fault::new(FaultKind::AccelerometerScale, &[STANDARD_GRAVITY_M_PER_S2])),
-        )
-    } else if measured < NO_GRAVITY_RATIO * gravity {
-        (
-            Severity::Error,
-            "gravity is already removed from the accelerations",
-            "record the raw accelerometer (specific force): linear accelerations of a filter cannot be used",
-            Some(Fault::from(FaultKind::UnusableImu)),
-        )
-    } else if let Some(factor) = range_factor.filter(|_| is_scaled) {
-        (
-            Severity::Error,
-            multiple.as_str(),
-            "the range setting of the sensor and the scale of its driver differ: correct one of them",
-            Some(Fault::new(FaultKind::AccelerometerScale, &[factor.recip()])),
-        )
-    } else if difference.abs() > unusable {
-        (
-            Severity::Error,
-            "the accelerometer does not measure gravity",
-            "check units, scale and IMU intrinsics in the driver: while stationary the norm must be gravity",
-            None,
-        )
-    } else if difference.abs() > noted && !stationary.is_empty() {
-        (
-            if difference.abs() > large { Severity::Warning } else { Severity::Note },
-            "the accelerometer has a large bias or scale error along gravity",
-            "the estimator finds the bias once the vehicle moves; expect a slow start, or calibrate the IMU",
-            None,
-        )
-    } else {
-        return findings.good(Area::Imu, "the accelerometer measures gravity", evidence);
-    };
-    findings.add(severity, Area::Imu, title, evidence, remedy);
-    findings.state_faults(fault);
-    if severity == Severity::Error {
-        findings.exclude(Measurement::Accelerometer);
-    }
-}
-
-/// True if the norm of the specific force varies little around its median: it contains gravity, in whatever unit.
-fn has_steady_norm(samples: &[ImuSample]) -> bool {
-    let norms: Vec<f64> = samples.iter().map(|sample| sample.specific_force_m_per_s2.norm()).collect();
-    middle_range(&norms) < STEADY_RANGE * median(&norms)
 }
 
 fn check_gyroscope_bias(stationary: &[Window], findings: &mut Findings) -> Option<Vector3<f64>> {

@@ -3,6 +3,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3xX, Vector3};
 
+use crate::faults::Fault;
 use crate::geometry::{SIGMA_PER_MEDIAN, mean_square_quantile};
 use crate::log_check::report::FindingInterval;
 use crate::log_check::statistics::{median, percentile};
@@ -32,6 +33,8 @@ const REMAINING_PART: f64 = 0.1;
 /// Length of the bins of a misfit over time, in seconds, and their largest number.
 const BIN_S: f64 = 1.0;
 const MOST_BINS: f64 = 120.0;
+/// Median misfit of consecutive bins from which they are wrong although the log as a whole agrees.
+const WRONG_STRETCH: f64 = 10.0;
 /// Bins beside an interval that agree and their smallest signal, as a ratio of the signal inside: they show that the interval
 /// ends there.
 const MIN_SOUND: usize = 2;
@@ -50,6 +53,8 @@ pub(super) enum Parameter {
     Scale,
     /// The same for each axis of the second source.
     AxisScales,
+    /// Change of the angular rates over the log, linear in time, in rad/s.
+    RateDrift,
     /// Specific force of a body at rest in the world, in m/s².
     Gravity,
     /// Bias of the specific forces in m/s².
@@ -60,26 +65,42 @@ pub(super) enum Parameter {
     PositionScale,
     /// Factor on the cross product of angular rate and velocity that is missing.
     Transport,
+    /// Positions have other axes than the orientations with them. Values: matrix (3 × 3) from their axes, by column.
+    PositionAxes,
+    /// Specific forces have the axes of the world; no value.
+    WorldAxes,
+    /// Specific forces have the axes of the heading: level, with the yaw of the vehicle; no value.
+    LevelAxes,
 }
 
 impl Parameter {
     pub(super) fn width(self) -> usize {
         match self {
             Self::Delay | Self::Scale | Self::PositionScale | Self::Transport => 1,
-            Self::Rate | Self::Orientation | Self::AxisScales | Self::Gravity | Self::ForceBias | Self::Lever => 3,
+            Self::Rate
+            | Self::RateDrift
+            | Self::Orientation
+            | Self::AxisScales
+            | Self::Gravity
+            | Self::ForceBias
+            | Self::Lever => 3,
+            Self::PositionAxes | Self::WorldAxes | Self::LevelAxes => 0,
         }
     }
 
     /// Prior standard deviation: wide, so that only directions without measurements are given by it.
     fn sigma(self) -> f64 {
         match self {
-            Self::Rate | Self::Delay => 0.1,
+            Self::Rate | Self::RateDrift | Self::Delay => 0.1,
             Self::Orientation
             | Self::Scale
             | Self::AxisScales
             | Self::Lever
             | Self::PositionScale
-            | Self::Transport => 1.0,
+            | Self::Transport
+            | Self::PositionAxes
+            | Self::WorldAxes
+            | Self::LevelAxes => 1.0,
             Self::ForceBias => 3.0,
             Self::Gravity => 100.0,
         }
@@ -125,6 +146,8 @@ pub(super) struct Fit {
     pub(super) disagrees: Option<FindingInterval>,
     /// Parameter that describes the disagreement.
     pub(super) change: Option<Change>,
+    /// Fault of one of the sources that explains it.
+    pub(super) fault: Option<Fault>,
 }
 
 /// Change of parameters at a time.
@@ -136,6 +159,9 @@ struct Step {
     /// Parameters before it.
     before: DVector<f64>,
 }
+
+/// Solution with its covariance and χ².
+type Solution = (DVector<f64>, DMatrix<f64>, f64);
 
 /// Sums of the normal equations of some rows.
 #[derive(Clone)]
@@ -188,8 +214,8 @@ impl Sums {
         sums
     }
 
-    /// Solution with prior standard deviations, its covariance and χ².
-    fn solve(&self, sigmas: &[f64]) -> Option<(DVector<f64>, DMatrix<f64>, f64)> {
+    /// Solution with prior standard deviations.
+    fn solve(&self, sigmas: &[f64]) -> Option<Solution> {
         let prior = DVector::from_iterator(sigmas.len(), sigmas.iter().map(|sigma| sigma.powi(-2)));
         let factor = (&self.hessian + DMatrix::from_diagonal(&prior)).cholesky()?;
         let solution = factor.solve(&self.gradient);
@@ -217,13 +243,7 @@ impl Comparison<'_> {
             return None;
         }
         let sound = self.columns(&self.parameters[..self.sound]);
-        let mut weights = vec![1.0; rows.len()];
-        let mut solved = self.solved(&sound, &weights)?;
-        for _ in 0..ROUNDS {
-            let misfits = self.misfits(&sound, &solved.0);
-            weights = misfits.iter().map(|it| (LARGEST_COUNTED / it.max(LARGEST_COUNTED)).powi(2)).collect();
-            solved = self.solved(&sound, &weights)?;
-        }
+        let (weights, solved) = self.robust(&sound)?;
         let (mut constants, covariance, square) = solved;
         let mut misfits = self.misfits(&sound, &constants);
         let (mut disagrees, mut change) = (None, None);
@@ -237,6 +257,9 @@ impl Comparison<'_> {
         }
         let misfit = root_mean_square(&misfits);
         let bins = self.bins(&misfits);
+        if disagrees.is_none() && misfit <= LARGEST_MISFIT {
+            disagrees = wrong_stretch(&bins);
+        }
         let suspect = self.suspect(&sound, &weights, square).filter(|_| misfit > LARGEST_MISFIT);
         if disagrees.is_none() && misfit > LARGEST_MISFIT || suspect.is_some() {
             disagrees = Some(if suspect.is_some() { FindingInterval::default() } else { self.interval(&bins) });
@@ -250,7 +273,30 @@ impl Comparison<'_> {
         let noise = median(&rows.iter().map(|row| row.variance.sqrt()).collect::<Vec<_>>());
         let sigmas = covariance.diagonal().iter().map(|variance| variance.sqrt()).collect();
         let constants = constants.iter().copied().collect();
-        Some(Fit { constants, sigmas, misfit, by_axis, noise, bins, disagrees, change })
+        Some(Fit { constants, sigmas, misfit, by_axis, noise, bins, disagrees, change, fault: None })
+    }
+
+    /// Misfits of all rows, in units of the predicted noise, with the best constant parameters of sound sources; `None` with too
+    /// few rows.
+    pub(super) fn least_misfits(&self) -> Option<Vec<f64>> {
+        if self.rows.len() < MIN_ROWS {
+            return None;
+        }
+        let sound = self.columns(&self.parameters[..self.sound]);
+        let (_, (solution, ..)) = self.robust(&sound)?;
+        Some(self.misfits(&sound, &solution))
+    }
+
+    /// Weights of the rows, and the solution for some columns with them.
+    fn robust(&self, columns: &[usize]) -> Option<(Vec<f64>, Solution)> {
+        let mut weights = vec![1.0; self.rows.len()];
+        let mut solved = self.solved(columns, &weights)?;
+        for _ in 0..ROUNDS {
+            let misfits = self.misfits(columns, &solved.0);
+            weights = misfits.iter().map(|it| (LARGEST_COUNTED / it.max(LARGEST_COUNTED)).powi(2)).collect();
+            solved = self.solved(columns, &weights)?;
+        }
+        Some((weights, solved))
     }
 
     /// Values of a further parameter beside the parameters of sound sources, with their standard deviations for a misfit in units of
@@ -290,7 +336,7 @@ impl Comparison<'_> {
         sums
     }
 
-    fn solved(&self, columns: &[usize], weights: &[f64]) -> Option<(DVector<f64>, DMatrix<f64>, f64)> {
+    fn solved(&self, columns: &[usize], weights: &[f64]) -> Option<Solution> {
         self.sums(weights).of_columns(columns).solve(&self.sigmas(columns))
     }
 
@@ -319,7 +365,8 @@ impl Comparison<'_> {
             return None;
         }
         let after = all.minus(&before);
-        let first = before.of_columns(sound).solve(&sigmas)?.0;
+        // The weights belong to a fit to both sides, in which rows without a signal count most.
+        let (_, (first, ..)) = Comparison { rows: &rows[..at], ..*self }.robust(sound)?;
         // A change lasts, other than some wrong measurements.
         let misfits = self.misfits(sound, &first);
         let half = at + (rows.len() - at) / 2;
@@ -347,13 +394,14 @@ impl Comparison<'_> {
         Some(Step { at, change, before: first })
     }
 
-    /// Parameter, not one of sound sources, that explains a misfit of the whole log.
+    /// Parameter, not one of sound sources, that explains a misfit of the whole log: it leaves no more than sound sources have.
     fn suspect(&self, sound: &[usize], weights: &[f64], square: f64) -> Option<Change> {
         let suspects = self.parameters[self.sound..].iter().filter_map(|parameter| {
             let columns = self.columns(&[*parameter]);
             let (solution, _, left) = self.solved(&[sound, &columns].concat(), weights)?;
             let values = solution.rows(sound.len(), columns.len()).iter().copied().collect();
-            Some((left, Change { parameter: *parameter, values }))
+            let misfit = root_mean_square(&self.misfits(&[sound, &columns].concat(), &solution));
+            (misfit < LARGEST_MISFIT).then_some((left, Change { parameter: *parameter, values }))
         });
         let (left, change) = suspects.min_by(|one, other| one.0.total_cmp(&other.0))?;
         (left < REMAINING_PART * square).then_some(change)
@@ -404,9 +452,24 @@ impl Comparison<'_> {
     }
 }
 
+/// Longest stretch of bins that are wrong while the log as a whole agrees; `None` without one of at least two bins.
+fn wrong_stretch(bins: &[[f64; 2]]) -> Option<FindingInterval> {
+    let stretches = bins.chunk_by(|one, other| (one[1] > WRONG_STRETCH) == (other[1] > WRONG_STRETCH));
+    let wrong = stretches.filter(|bins| bins.len() >= MIN_SOUND && bins[0][1] > WRONG_STRETCH);
+    let longest = wrong.max_by_key(|bins| bins.len())?;
+    let half_s = 0.5 * (bins.get(1)?[0] - bins.first()?[0]);
+    let (first, last) = (longest.first()?, longest.last()?);
+    Some(FindingInterval { since_s: Some(first[0] - half_s), until_s: Some(last[0] + half_s) })
+}
+
 /// Root of the mean square of misfits in three axes, from a quantile of them.
 pub(super) fn root_mean_square(misfits: &[f64]) -> f64 {
     percentile(misfits, COMPARED_QUANTILE) / mean_square_quantile(3.0, COMPARED_SIGMAS).sqrt()
+}
+
+/// Sum of the squares of misfits, of which large ones count no more.
+pub(super) fn counted_square(misfits: &[f64]) -> f64 {
+    misfits.iter().map(|misfit| misfit.min(LARGEST_COUNTED).powi(2)).sum()
 }
 
 /// Residual that some columns leave.

@@ -6,6 +6,7 @@ mod comparison;
 mod culprits;
 mod directions;
 mod forces;
+mod frames;
 mod joints;
 mod orientations;
 mod pair;
@@ -22,44 +23,86 @@ use nalgebra::UnitQuaternion;
 pub(super) use self::compared::Compared;
 pub use self::comparison::{AGREEING_MISFIT, LARGEST_MISFIT};
 use self::comparison::{Fit, Parameter};
-use self::culprits::{Verdict, culprits};
+use self::culprits::culprits;
 use self::orientations::Orientations;
 use self::pair::Pair;
 use self::source::Source;
-use self::statement::Statement;
+use self::statement::{SAME_TIME_S, Statement};
 use super::report::agreement::{Agreement, Quantity};
+use super::report::suspects::Suspects;
 use super::report::{Area, Finding, FindingInterval, Findings, Measurement, Severity};
 use super::statistics::median;
-use crate::faults::{Fault, FaultKind};
+use crate::faults::{Fault, FaultKind, Sentence, Subject};
 use crate::geometry::RigidTransform;
-use crate::sensors::{CameraMount, CameraRig};
+use crate::sensors::{CameraMount, CameraRig, Rig};
 
 /// Misfit of directions in units of their noise from which they disagree; between it and [`LARGEST_MISFIT`] nothing is
 /// concluded: parallax may be small.
 const WRONG_DIRECTION: f64 = 5.0;
-/// Times that are closer count as one, in seconds.
-const SAME_TIME_S: f64 = 1.0;
 /// Ratio of the misfit of a camera with the images of another one to its own from which images are exchanged.
 const EXCHANGED_RATIO: f64 = 0.25;
 
-/// Compares all sources; adds a finding about one that is wrong without a known cause, and removes causes of other sources
-/// that the comparison excludes.
-pub(super) fn isolate(compared: &Compared<'_>, findings: &mut Findings) -> Agreement {
-    let (rotations, truth) = compared.rotations(findings);
+/// Adds a finding about a source that is wrong without a known cause, and removes causes of other sources that the comparisons
+/// exclude.
+pub(super) fn isolate(compared: &Compared<'_>, rotations: Rotations, findings: &mut Findings) -> Agreement {
+    let Rotations { pairs: mut rotations, truth } = rotations;
+    mark_unexplained(&mut rotations, findings);
     let mut statements: Vec<Statement> = compared.statement(&rotations).into_iter().collect();
     for statement in &mut statements {
         exclude_causes(statement, &rotations, findings);
     }
     let suspected: Vec<Source> = statements.iter().flat_map(|statement| statement.suspected.clone()).collect();
+    let truth = truth.filter(|_| !suspected.contains(&Source::GroundTruth));
     let motion = truth.map_or_else(Vec::new, |truth| compared.motion(&truth, &suspected, findings));
-    statements.extend(Statement::of(&motion_culprits(&motion), &motion));
+    if let Some(mut of_motion) = Statement::of(&motion_culprits(&motion), &motion, compared.rig) {
+        exclude_causes(&mut of_motion, &motion, findings);
+        of_motion.join_axes(findings, compared.rig);
+        statements.push(of_motion);
+    }
     let isolated = statements.iter().map(|statement| statement.title.clone()).collect();
+    let forces = motion.iter().find(|pair| pair.quantity == Quantity::SpecificForce);
+    if forces.is_some_and(|pair| pair.fit.disagrees.is_none()) {
+        name_axes_of_imu(findings, compared.rig);
+    }
+    // The axes of the whole IMU explain the gyroscope's.
+    let is_of_imu = |fault: &Fault| fault.kind == FaultKind::ImuAxes;
+    let has_imu_axes = statements.iter().any(|it| it.cause.as_ref().is_some_and(is_of_imu))
+        || findings.list.iter().any(|finding| finding.faults.iter().any(is_of_imu));
+    if has_imu_axes {
+        statements.retain(|it| it.suspected != [Source::Gyroscope]);
+        let is_of_gyroscope = |fault: &Fault| fault.kind == FaultKind::GyroscopeAxes;
+        findings.retract_misfits(|finding| finding.faults.iter().any(is_of_gyroscope));
+    }
     for statement in statements {
         if statement.is_cause || !is_explained(&statement, findings) {
             report(statement, findings);
         }
     }
     Agreement { pairs: rotations.iter().chain(&motion).map(Pair::agreement).collect(), isolated }
+}
+
+/// Sources of rotation, compared with each other.
+pub(super) struct Rotations {
+    pairs: Vec<Pair>,
+    /// Axes and clock of a ground truth that agrees with the gyroscope, or did at first.
+    truth: Option<TruthOffsets>,
+}
+
+/// Turns a finding on other axes of the gyroscope in the whole log into one on the axes of the IMU: the accelerometer agrees with a
+/// ground truth that has the axes of this gyroscope.
+fn name_axes_of_imu(findings: &mut Findings, rig: &Rig) {
+    let is_turned = |fault: &Fault| {
+        fault.kind == FaultKind::GyroscopeAxes
+            && fault.since_s.is_none()
+            && fault.axes().is_some_and(|axes| !axes.is_left_handed())
+    };
+    let of_gyroscope = findings.retract_misfits(|finding| finding.faults.iter().any(is_turned));
+    let Some(Finding { evidence, faults, .. }) = of_gyroscope.into_iter().next() else { return };
+    let Some(fault) = faults.into_iter().find(is_turned) else { return };
+    let fault = Fault { kind: FaultKind::ImuAxes, ..fault };
+    let Sentence { severity, statement, remedy } = Subject { rig, camera_key: "" }.sentence(&fault);
+    findings.add(severity, Area::Imu, statement, evidence, remedy);
+    findings.state_faults([fault]);
 }
 
 /// Ground truth against the gyroscope.
@@ -69,22 +112,16 @@ struct TruthOffsets {
     delay_s: f64,
 }
 
-impl Compared<'_> {
-    /// Pairs of sources of rotation, of which a smaller misfit of a camera counts if each of its rotations exceeds its noise by
-    /// another check, and the axes and the clock of a ground truth that agrees with the gyroscope.
-    fn rotations(&self, findings: &Findings) -> (Vec<Pair>, Option<TruthOffsets>) {
-        let sources = Orientations::all(self);
+impl Rotations {
+    pub(super) fn of(compared: &Compared<'_>) -> Self {
+        let sources = Orientations::all(compared);
         let mut pairs = Vec::new();
         let mut truth = None;
         for (number, one) in sources.iter().enumerate() {
             for other in &sources[number + 1..] {
-                let Some((sources, mut fit, offsets)) = rotation::compare(one, other) else { continue };
-                let is_unexplained =
-                    sources.iter().any(|it| it.camera_key().is_some_and(|key| findings.is_unexplained(key)));
-                if is_unexplained && fit.disagrees.is_none() && fit.misfit > AGREEING_MISFIT {
-                    fit.disagrees = Some(FindingInterval::default());
-                }
-                if fit.disagrees.is_none() {
+                let Some((sources, fit, offsets)) = rotation::compare(one, other) else { continue };
+                // Before a change the sources agree.
+                if fit.disagrees.is_none_or(|interval| interval.since_s.is_some()) {
                     let axes = offsets.first_from_second;
                     match &sources {
                         [Source::GroundTruth, Source::Gyroscope] => {
@@ -100,9 +137,25 @@ impl Compared<'_> {
                 pairs.push(Pair { quantity: Quantity::Rotation, sources, first_from_second, fit });
             }
         }
-        (pairs, truth)
+        Self { pairs, truth }
     }
 
+    /// Sensors that may be the cause of the misfit of a camera: all of them unless it disagrees with the gyroscope.
+    pub(super) fn suspects(&self, compared: &Compared<'_>, camera_key: &str) -> Suspects {
+        let disagrees = |pair: &Pair| {
+            pair.fit.disagrees.is_some()
+                && pair.sources.contains(&Source::Gyroscope)
+                && pair.sources.iter().any(|source| source.camera_key() == Some(camera_key))
+        };
+        if !self.pairs.iter().any(disagrees) {
+            return Suspects::default();
+        }
+        let (alternatives, _) = compared.culprits(&self.pairs);
+        Suspects::only(alternatives.iter().flatten().flat_map(Source::suspects).collect())
+    }
+}
+
+impl Compared<'_> {
     /// Pairs of the accelerometer and the images with the motion of the ground truth, but for images whose rotations are
     /// suspected.
     fn motion(&self, truth: &TruthOffsets, suspected: &[Source], findings: &Findings) -> Vec<Pair> {
@@ -112,12 +165,14 @@ impl Compared<'_> {
             let sources = [source, Source::Positions];
             pairs.push(Pair { quantity, sources, first_from_second: UnitQuaternion::identity(), fit });
         };
-        if findings.can_compare(Measurement::Accelerometer)
+        let can_compare = |it| findings.can_compare(it) || findings.is_by_pair(it);
+        if can_compare(Measurement::Accelerometer)
             && let Some(fit) = forces::compare(self, body_from_imu, *delay_s)
         {
             add(Quantity::SpecificForce, Source::Accelerometer, fit);
         }
-        let cameras = self.rig.cameras.iter();
+        // The cameras have the axes of the rig's IMU, which a wrong gyroscope may not have.
+        let cameras = self.rig.cameras.iter().filter(|_| !suspected.contains(&Source::Gyroscope));
         for camera in cameras.filter(|camera| !suspected.contains(&images_of(camera))) {
             let angles = directions::angles_rad(self, camera, body_from_imu, *delay_s);
             if let Some(fit) = fit_of_directions(&angles) {
@@ -129,8 +184,7 @@ impl Compared<'_> {
 
     /// Statement about sources of rotation that disagree.
     fn statement(&self, pairs: &[Pair]) -> Option<Statement> {
-        let verdicts: Vec<Verdict> = pairs.iter().map(Pair::verdict).collect();
-        let alternatives = culprits(&verdicts);
+        let (alternatives, by_joint) = self.culprits(pairs);
         let suspected: BTreeSet<&Source> = alternatives.iter().flatten().collect();
         if let Some(exchange) = self.exchange(&suspected, pairs) {
             return Some(exchange);
@@ -138,13 +192,23 @@ impl Compared<'_> {
         if let Some(inverted) = self.inverted_truth(&suspected, pairs) {
             return Some(inverted);
         }
+        let suspected: Vec<&Source> = suspected.into_iter().collect();
+        if let Some(framed) = self.other_frame(&suspected, pairs) {
+            return Some(framed);
+        }
+        Statement::of(&alternatives, by_joint.as_deref().unwrap_or(pairs), self.rig)
+    }
+
+    /// Smallest sets of sources that explain the pairs, and the pairs with one joint in place of a camera if it is wrong alone.
+    fn culprits(&self, pairs: &[Pair]) -> (Vec<Vec<Source>>, Option<Vec<Pair>>) {
+        let alternatives = culprits_of(pairs);
         if let [only] = alternatives.as_slice()
             && let [images] = only.as_slice()
             && let Some(of_joint) = self.of_joint(images, pairs)
         {
-            return Statement::of(&culprits(&of_joint.iter().map(Pair::verdict).collect::<Vec<_>>()), &of_joint);
+            return (culprits_of(&of_joint), Some(of_joint));
         }
-        Statement::of(&alternatives, pairs)
+        (alternatives, None)
     }
 
     /// Suspected ground truth whose orientations agree with the gyroscope if they are inverted.
@@ -196,13 +260,28 @@ fn images_of(camera: &CameraRig) -> Source {
     Source::Images { camera_key: camera.key.clone(), with_joints }
 }
 
-/// Wrong sources of motion: accelerations that agree up to a factor are those of positions in another unit.
+/// Wrong sources of motion: accelerations that agree up to a factor or other axes belong to positions with another unit
+/// or world.
 fn motion_culprits(pairs: &[Pair]) -> Vec<Vec<Source>> {
-    let scaled = |pair: &Pair| pair.fit.change.as_ref().is_some_and(|it| it.parameter == Parameter::PositionScale);
-    if pairs.iter().any(scaled) {
+    let of_positions = |parameter| matches!(parameter, Parameter::PositionScale | Parameter::PositionAxes);
+    if pairs.iter().filter_map(|pair| pair.fit.change.as_ref()).any(|change| of_positions(change.parameter)) {
         return vec![vec![Source::Positions]];
     }
+    culprits_of(pairs)
+}
+
+fn culprits_of(pairs: &[Pair]) -> Vec<Vec<Source>> {
     culprits(&pairs.iter().map(Pair::verdict).collect::<Vec<_>>())
+}
+
+/// A smaller misfit of a camera counts if each of its rotations exceeds its noise by another check.
+fn mark_unexplained(pairs: &mut [Pair], findings: &Findings) {
+    for Pair { sources, fit, .. } in pairs {
+        let is_unexplained = sources.iter().any(|it| it.camera_key().is_some_and(|key| findings.is_unexplained(key)));
+        if is_unexplained && fit.disagrees.is_none() && fit.misfit > AGREEING_MISFIT {
+            fit.disagrees = Some(FindingInterval::default());
+        }
+    }
 }
 
 /// Comparison of directions by the angles between them; `None` without them or if nothing follows.
@@ -227,10 +306,25 @@ fn exclude_causes(statement: &mut Statement, pairs: &[Pair], findings: &mut Find
     }
     // Two sources that disagree are blamed by the third one.
     let mut excluded = match statement.suspected.as_slice() {
-        [Source::Gyroscope] => findings.retract_by_truth(|finding| statement.has_value || finding.area != Area::Imu),
-        [Source::GroundTruth] => findings.retract_by_truth(|finding| finding.area == Area::Imu),
+        [Source::Gyroscope] => {
+            let begins = statement.interval.since_s.is_some();
+            // Late angular rates are early images.
+            let is_late = statement.has_value && statement.parameter == Some(Parameter::Delay);
+            findings.retract_by_pair(Measurement::Gyroscope, |finding| {
+                if finding.faults.iter().any(|fault| fault.kind == FaultKind::CameraClock) {
+                    is_late
+                } else {
+                    statement.has_value || begins || finding.area != Area::Imu
+                }
+            })
+        }
+        [Source::Accelerometer] => findings.retract_by_pair(Measurement::Accelerometer, |_| true),
+        [Source::GroundTruth] => findings.retract_by_pair(Measurement::Gyroscope, |finding| finding.area == Area::Imu),
         _ => Vec::new(),
     };
+    if excluded.iter().flat_map(|finding| &finding.faults).any(|it| it.kind == FaultKind::AccelerometerAxes) {
+        findings.include(Measurement::Accelerometer);
+    }
     let agreeing: Vec<&Source> =
         pairs.iter().filter(|pair| pair.fit.disagrees.is_none()).flat_map(|pair| &pair.sources).collect();
     let is_excluded = |finding: &Finding| {

@@ -30,15 +30,22 @@ const SIGNIFICANT_SIGMAS: f64 = 5.0;
 /// Ratio of the misfit in other axes to that in the rig's from which they are the first guess.
 const OTHER_AXES_RATIO: f64 = 0.5;
 
-const PARAMETERS: [Parameter; 5] =
-    [Parameter::Rate, Parameter::Orientation, Parameter::Delay, Parameter::Scale, Parameter::AxisScales];
+const PARAMETERS: [Parameter; 6] = [
+    Parameter::Rate,
+    Parameter::Orientation,
+    Parameter::Delay,
+    Parameter::Scale,
+    Parameter::AxisScales,
+    Parameter::RateDrift,
+];
 /// Number of the parameters that sound sources have, and columns of the others.
 const SOUND: usize = 4;
 const ORIENTATION: usize = 3;
 const DELAY: usize = 6;
 const SCALE: usize = 7;
 const AXIS_SCALES: usize = 8;
-const COLUMNS: usize = 11;
+const RATE_DRIFT: usize = 11;
+const COLUMNS: usize = 14;
 
 /// Constant differences of two sources of rotation.
 #[derive(Clone, Copy, Debug)]
@@ -53,7 +60,6 @@ pub(super) struct Offsets {
 pub(super) fn compare(one: &Orientations, other: &Orientations) -> Option<([Source; 2], Fit, Offsets)> {
     let (first, second) = if one.spacing_s() >= other.spacing_s() { (one, other) } else { (other, one) };
     let intervals = first.intervals_s(LENGTH_S);
-    let mut offsets = Offsets { first_from_second: UnitQuaternion::identity(), delay_s: 0.0 };
     let vectors: Vec<(Vector3<f64>, Vector3<f64>)> = intervals
         .iter()
         .filter_map(|[from_s, to_s]| {
@@ -61,29 +67,22 @@ pub(super) fn compare(one: &Orientations, other: &Orientations) -> Option<([Sour
             Some((so3::log(&predicted?.0), so3::log(&measured?.0)))
         })
         .collect();
-    if let Some((rotation, _)) = best_rotation(&vectors) {
-        let misfit = |rotation: &UnitQuaternion<f64>| {
-            median(&vectors.iter().map(|(from, to)| (to - rotation * from).norm()).collect::<Vec<_>>())
-        };
-        if misfit(&rotation) < OTHER_AXES_RATIO * misfit(&offsets.first_from_second) {
-            offsets.first_from_second = rotation;
-        }
+    let best_axes = |vectors: &[(Vector3<f64>, Vector3<f64>)]| best_rotation(vectors).map(|(rotation, _)| rotation);
+    let given = UnitQuaternion::identity();
+    let misfit = |rotation: &UnitQuaternion<f64>| {
+        median(&vectors.iter().map(|(from, to)| (to - rotation * from).norm()).collect::<Vec<_>>())
+    };
+    let best = best_axes(&vectors).filter(|best| misfit(best) < OTHER_AXES_RATIO * misfit(&given));
+    let (mut fit, mut offsets) = fit_from(first, second, &intervals, best.unwrap_or(given))?;
+    // Axes that change at a time may be other ones for most of the log.
+    let begins = |fit: &Fit| fit.disagrees.is_none_or(|interval| interval.since_s.is_some());
+    if !begins(&fit) {
+        let earlier = best_axes(&vectors[..vectors.len() / 3]);
+        let others = best.map(|_| given).into_iter().chain(earlier);
+        let begun = others.filter_map(|axes| fit_from(first, second, &intervals, axes)).find(|(fit, _)| begins(fit));
+        (fit, offsets) = begun.unwrap_or((fit, offsets));
     }
     let sources = [first.source.clone(), second.source.clone()];
-    let mut fit = None;
-    for round in 0..ROUNDS {
-        let rows = rows(first, second, &intervals, &offsets);
-        let comparison =
-            Comparison { rows: &rows, parameters: &PARAMETERS, sound: SOUND, changing: &PARAMETERS[..SOUND] };
-        let found = comparison.fit()?;
-        if round + 1 < ROUNDS {
-            let step = Vector3::from_iterator(found.constants[ORIENTATION..DELAY].iter().copied());
-            offsets.first_from_second = so3::plus_left(&offsets.first_from_second, &step);
-            offsets.delay_s += found.constants[DELAY];
-        }
-        fit = Some(found);
-    }
-    let mut fit = fit?;
     if fit.disagrees.is_none()
         && let Some(change) = constant_change(&sources, &fit, &offsets)
     {
@@ -91,6 +90,27 @@ pub(super) fn compare(one: &Orientations, other: &Orientations) -> Option<([Sour
         fit.change = Some(change);
     }
     Some((sources, fit, offsets))
+}
+
+/// Fit of rotations over some intervals, whose axes are first these.
+fn fit_from(
+    first: &Orientations,
+    second: &Orientations,
+    intervals_s: &[[f64; 2]],
+    first_from_second: UnitQuaternion<f64>,
+) -> Option<(Fit, Offsets)> {
+    let mut offsets = Offsets { first_from_second, delay_s: 0.0 };
+    let fit = |offsets: &Offsets| {
+        let rows = rows(first, second, intervals_s, offsets);
+        Comparison { rows: &rows, parameters: &PARAMETERS, sound: SOUND, changing: &PARAMETERS[..SOUND] }.fit()
+    };
+    for _ in 1..ROUNDS {
+        let found = fit(&offsets)?;
+        let step = Vector3::from_iterator(found.constants[ORIENTATION..DELAY].iter().copied());
+        offsets.first_from_second = so3::plus_left(&offsets.first_from_second, &step);
+        offsets.delay_s += found.constants[DELAY];
+    }
+    Some((fit(&offsets)?, offsets))
 }
 
 /// Constant difference that sound sources do not have.
@@ -115,6 +135,8 @@ fn constant_change(sources: &[Source; 2], fit: &Fit, offsets: &Offsets) -> Optio
 }
 
 fn rows(first: &Orientations, second: &Orientations, intervals_s: &[[f64; 2]], offsets: &Offsets) -> Vec<Row> {
+    let [first_s, last_s] = [intervals_s.first(), intervals_s.last()].map(|it| it.map_or(0.0, |[from_s, _]| *from_s));
+    let length_s = (last_s - first_s).max(LENGTH_S);
     let row = |interval_s: &[f64; 2]| {
         let [from_s, to_s] = *interval_s;
         let (measured, of_first) = first.rotation_between(from_s, to_s)?;
@@ -134,6 +156,8 @@ fn rows(first: &Orientations, second: &Orientations, intervals_s: &[[f64; 2]], o
         jacobian.set_column(DELAY, &by_delay);
         jacobian.set_column(SCALE, &predicted);
         let of_second = turn.transpose() * predicted;
+        let drifted = Matrix3::identity() * ((from_s - to_s) * (from_s - first_s) / length_s);
+        jacobian.fixed_columns_mut::<3>(RATE_DRIFT).copy_from(&drifted);
         jacobian.fixed_columns_mut::<3>(AXIS_SCALES).copy_from(&(turn * Matrix3::from_diagonal(&of_second)));
         Some((0.5 * (from_s + to_s), measured - predicted, jacobian, of_first + noise_of_second, measured.norm()))
     };

@@ -1,6 +1,7 @@
 //! Sources of measurements that are compared with each other.
 
 use crate::faults::{Area, Sensor};
+use crate::log_check::report::suspects::Suspect;
 
 /// Source of a quantity that others measure, too.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -76,6 +77,14 @@ impl Source {
             Self::Joint { .. } | Self::Attitude(_) => matches!(area, Area::Encoders | Area::Time),
             Self::GroundTruth | Self::Positions => matches!(area, Area::Log | Area::Time),
         }
+    }
+
+    /// Sensors with its measurements. A wrong angle of the last joint is a rotation of the camera, too.
+    pub(super) fn suspects(&self) -> Vec<Suspect> {
+        let joint = if let Self::Joint { joint, .. } = self { Some(joint.clone()) } else { None };
+        let sensors = [Sensor::Imu, Sensor::Camera, Sensor::Joints].into_iter();
+        let used = sensors.filter(|sensor| self.uses(*sensor) || (joint.is_some() && *sensor == Sensor::Camera));
+        used.map(|sensor| Suspect { sensor, joint: joint.clone().filter(|_| sensor == Sensor::Joints) }).collect()
     }
 
     /// True if its measurements are those of a sensor.

@@ -3,6 +3,7 @@
 pub(super) mod agreement;
 mod interval;
 mod render;
+pub(super) mod suspects;
 pub(super) mod verdict;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -151,8 +152,11 @@ pub(super) struct Findings {
     /// Places of the findings about a misfit, each with its camera or topic: causes with their faults, and without faults
     /// unexplained ones.
     misfits: BTreeMap<usize, String>,
-    /// Places of the findings by comparisons of the ground truth with the gyroscope.
-    by_truth: BTreeSet<usize>,
+    /// Places of the findings by comparisons of two sources of which the other one may be wrong, with the measurements that they
+    /// use.
+    by_pair: BTreeMap<usize, Vec<Measurement>>,
+    /// Places of the findings that are the consequence of some fault and explain none.
+    symptoms: BTreeSet<usize>,
 }
 
 impl Findings {
@@ -211,16 +215,29 @@ impl Findings {
         self.misfits.iter().any(|(place, subject)| subject == of && self.list[*place].faults.is_empty())
     }
 
-    /// Findings but for misfits without a cause.
+    /// Findings but for symptoms, and misfits without a cause.
     pub(super) fn explained(&self) -> impl Iterator<Item = &Finding> {
         let findings = self.list.iter().enumerate();
-        let explained = |(place, it): &(usize, &Finding)| !it.faults.is_empty() || !self.misfits.contains_key(place);
+        let explained = |(place, it): &(usize, &Finding)| {
+            !it.faults.is_empty() || !(self.misfits.contains_key(place) || self.symptoms.contains(place))
+        };
         findings.filter(explained).map(|(_, finding)| finding)
     }
 
-    /// Marks the finding that was added last as one by a comparison with the ground truth, which another source may exclude.
-    pub(super) fn mark_by_truth(&mut self) {
-        self.by_truth.extend(self.list.len().checked_sub(1));
+    /// Marks the finding that was added last as one by a comparison of measurements with another source, which a third one may
+    /// exclude.
+    pub(super) fn mark_by_pair(&mut self, measurements: &[Measurement]) {
+        self.by_pair.extend(self.list.len().checked_sub(1).map(|place| (place, measurements.to_vec())));
+    }
+
+    /// True if a comparison of a measurement with another source reported a fault.
+    pub(super) fn is_by_pair(&self, measurement: Measurement) -> bool {
+        self.by_pair.values().any(|measurements| measurements.contains(&measurement))
+    }
+
+    /// Marks the finding that was added last as a consequence of some fault, which explains no misfit.
+    pub(super) fn mark_symptom(&mut self) {
+        self.symptoms.extend(self.list.len().checked_sub(1));
     }
 
     /// Removes and returns the findings about a misfit that are excluded.
@@ -229,9 +246,14 @@ impl Findings {
         self.retract(&places)
     }
 
-    /// Removes and returns the findings by comparisons with the ground truth that are excluded.
-    pub(super) fn retract_by_truth(&mut self, is_excluded: impl Fn(&Finding) -> bool) -> Vec<Finding> {
-        let places = self.by_truth.iter().copied().filter(|place| is_excluded(&self.list[*place])).collect();
+    /// Removes and returns the findings by comparisons of a measurement with another source that are excluded.
+    pub(super) fn retract_by_pair(
+        &mut self,
+        measurement: Measurement,
+        is_excluded: impl Fn(&Finding) -> bool,
+    ) -> Vec<Finding> {
+        let uses = self.by_pair.iter().filter(|(_, measurements)| measurements.contains(&measurement));
+        let places = uses.map(|(place, _)| *place).filter(|place| is_excluded(&self.list[*place])).collect();
         self.retract(&places)
     }
 
@@ -239,10 +261,11 @@ impl Findings {
     fn retract(&mut self, places: &BTreeSet<usize>) -> Vec<Finding> {
         let moved = |place: usize| place - places.range(..place).count();
         let kept = |place: &usize| !places.contains(place);
-        self.by_truth = self.by_truth.iter().copied().filter(kept).map(moved).collect();
-        let misfits = std::mem::take(&mut self.misfits).into_iter();
-        self.misfits =
-            misfits.filter(|(place, _)| kept(place)).map(|(place, subject)| (moved(place), subject)).collect();
+        self.symptoms = self.symptoms.iter().copied().filter(kept).map(moved).collect();
+        self.by_pair.retain(|place, _| kept(place));
+        self.by_pair = std::mem::take(&mut self.by_pair).into_iter().map(|(place, of)| (moved(place), of)).collect();
+        self.misfits.retain(|place, _| kept(place));
+        self.misfits = std::mem::take(&mut self.misfits).into_iter().map(|(place, of)| (moved(place), of)).collect();
         let (removed, list): (Vec<_>, Vec<_>) =
             std::mem::take(&mut self.list).into_iter().enumerate().partition(|(place, _)| places.contains(place));
         self.list = list.into_iter().map(|(_, finding)| finding).collect();
@@ -257,6 +280,11 @@ impl Findings {
     /// Excludes a measurement, whose fault is reported, from later comparisons.
     pub(super) fn exclude(&mut self, measurement: Measurement) {
         self.faulty.insert(measurement);
+    }
+
+    /// Allows comparisons of a measurement whose reported fault is retracted.
+    pub(super) fn include(&mut self, measurement: Measurement) {
+        self.faulty.remove(&measurement);
     }
 
     /// Excludes the images of a camera, whose stamps are reported to be wrong, from later comparisons.

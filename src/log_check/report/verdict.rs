@@ -70,7 +70,9 @@ impl Trust {
 /// Errors and warnings, the ones with the largest effect on a result first.
 pub fn problems(findings: &[Finding]) -> Vec<&Finding> {
     let mut problems: Vec<&Finding> = findings.iter().filter(|it| it.severity >= Severity::Warning).collect();
-    problems.sort_by_key(|it| (std::cmp::Reverse(it.severity), it.is_assumption, effect(it.area)));
+    // Of one subject, a known cause precedes what may be its consequence.
+    problems
+        .sort_by_key(|it| (std::cmp::Reverse(it.severity), it.is_assumption, effect(it.area), it.faults.is_empty()));
     problems
 }
 

@@ -179,7 +179,10 @@ impl<'a> RotationData<'a> {
     pub(crate) fn predictor<'b>(&'b self, chain: &'b ClassicalChain, fault: Option<&'b Fault>) -> Predictor<'b> {
         let corrected = |fault: &Fault| {
             let rates = &self.imu_facts.gyroscope;
-            fault.corrects(Sensor::Imu).then(|| rates.changed(|rate| fault.angular_velocity(rate)))
+            // The bias belongs to the sound measurements before a fault that begins.
+            let before = fault.since_s.and(self.imu_facts.gyroscope_bias_rad_per_s);
+            let bias = before.unwrap_or_default();
+            fault.corrects(Sensor::Imu).then(|| rates.changed(|rate| fault.angular_velocity(&(rate + bias)) - bias))
         };
         let joints = joint_maps(fault, &self.rig.joint_names());
         let has_play = joints.iter().any(|joint| joint.play_rad != 0.0);

@@ -41,10 +41,10 @@ const WHOLE_OFFSETS_S: [(f64, &str); 2] =
 pub(super) fn check_clocks(used: &[UsedTopic<'_>], findings: &mut Findings) {
     let clocks = Clocks::of(used);
     for topic in used {
-        if !clocks.is_apart(topic) {
-            check_future(topic, findings);
-        }
         check_drift(topic, findings);
+    }
+    for topic in used.iter().filter(|topic| !clocks.is_apart(topic)) {
+        check_future(topic, findings);
     }
     compare_clocks(used, &clocks, findings);
     for topic in used.iter().filter(|topic| topic.shift_s.abs() > LARGE_SHIFT_S) {
@@ -98,6 +98,7 @@ fn check_future(used: &UsedTopic<'_>, findings: &mut Findings) {
         let remedy =
             "the sensor's clock runs ahead of the recorder's: synchronize them (PTP, chrony), or expect a time offset";
         findings.add(Severity::Warning, Area::Time, format!("stamps of {role} are in the future"), evidence, remedy);
+        findings.mark_symptom();
     }
 }
 

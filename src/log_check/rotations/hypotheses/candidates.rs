@@ -2,6 +2,7 @@
 
 use super::fit::Hypothesis;
 use crate::faults::{Fault, FaultKind, JointUnit};
+use crate::geometry::SignedAxes;
 use crate::gimbal::ClassicalChain;
 use crate::log_check::permutations::permutations;
 use crate::log_check::rotations::data::RotationData;
@@ -61,6 +62,9 @@ pub(super) fn candidates(data: &RotationData<'_>, chain: &ClassicalChain) -> Vec
     let range = largest_range(data);
     let moves = |unit: &JointUnit| range * unit.size_rad() > MIN_RANGE_RAD;
     all.push(Hypothesis::new(JointUnit::all().filter(moves).map(in_unit).collect(), 0));
+    if names.len() > 1 {
+        all.push(fitted(FaultKind::JointScale, &[], 1));
+    }
     for name in &names {
         all.push(fitted(FaultKind::JointPlay, &[name], 1));
         all.push(fitted(FaultKind::JointScale, &[name], 1));
@@ -69,6 +73,25 @@ pub(super) fn candidates(data: &RotationData<'_>, chain: &ClassicalChain) -> Vec
         let jump = Fault::new(FaultKind::JointOffset, &[0.0]).of_joints([name]);
         all.push(Hypothesis::new(vec![jump], 1).since_one_of(times_s(data)));
     }
+    all
+}
+
+/// Hypothesis about axes of the gyroscope other than the rig's; of a rigid camera, in the whole log, they are another orientation.
+pub(super) fn other_axes() -> Hypothesis {
+    Hypothesis::new(SignedAxes::all().skip(1).map(|axes| Fault::of_axes(FaultKind::GyroscopeAxes, axes)).collect(), 0)
+}
+
+/// The hypotheses with those that a fault begins at a time in the log, at which the misfits grow, and with further ones that
+/// resemble another orientation of the camera if they act in the whole log.
+pub(super) fn since(hypotheses: Vec<Hypothesis>, change_s: f64) -> Vec<Hypothesis> {
+    let sudden = [
+        Hypothesis::new(FaultKind::ImageFlip.trials(&[]), 0),
+        Hypothesis::new(vec![Fault::new(FaultKind::CameraClock, &[0.0])], 1),
+    ];
+    let (mut all, constant): (Vec<_>, Vec<_>) = hypotheses.into_iter().partition(Hypothesis::begins);
+    all = all.into_iter().map(|it| it.since(change_s)).collect();
+    all.extend(constant.iter().cloned().chain(sudden).map(|it| it.since(change_s)));
+    all.extend(constant);
     all
 }
 

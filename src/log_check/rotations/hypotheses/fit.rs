@@ -34,6 +34,8 @@ const CONVERGED: f64 = 0.05;
 const FOLLOWED: usize = 2;
 /// Ratio of the median misfit with a correction to that without up to which it removes a misfit.
 const REMOVED_MISFIT: f64 = 0.6;
+/// Time around the one at which a fault begins in which a better one is searched, in seconds.
+const NEAR_S: f64 = 0.7;
 /// Minimum number of rotations.
 const MIN_ROTATIONS: usize = 12;
 
@@ -59,6 +61,22 @@ impl Hypothesis {
     /// The same from one of these times on.
     pub(super) fn since_one_of(self, since_s: Vec<f64>) -> Self {
         Self { since_s, ..self }
+    }
+
+    /// The same also from a further time on, if it begins at a time, else from this time on.
+    pub(super) fn since(mut self, since_s: f64) -> Self {
+        self.since_s.push(since_s);
+        self
+    }
+
+    /// True if the fault begins at a time.
+    pub(super) fn begins(&self) -> bool {
+        !self.since_s.is_empty()
+    }
+
+    /// Faults from which the values are fitted.
+    pub(super) fn starts(&self) -> &[Fault] {
+        &self.starts
     }
 
     /// The same with the camera's orientation by the rig.
@@ -180,6 +198,20 @@ impl<'a> Fitter<'a> {
         let fits = tried.into_iter().take(FOLLOWED).filter_map(|(_, start)| self.converged(start, fitted, &priors));
         let fits = fits.filter(|found| found.fault.is_possible());
         fits.min_by(|one, other| one.criterion.total_cmp(&other.criterion))
+    }
+
+    /// A fit whose fault begins at a time, at the time near it that fits best; `None` if it begins at none.
+    pub(super) fn at_best_time(&self, found: &Fitted) -> Option<Fitted> {
+        let since_s = found.fault.since_s?;
+        let middles = self.measured.iter().map(MeasuredRotation::middle_s);
+        let near = middles.filter(|middle_s| (middle_s - since_s).abs() < NEAR_S);
+        let fits = near.filter_map(|near_s| {
+            let fault = Fault { since_s: Some(near_s), ..found.fault.clone() };
+            let fit = self.linear_fit(Some(&fault), 0, &self.priors)?;
+            let criterion = found.criterion + fit.deviance - found.fit.deviance;
+            Some(Fitted { fault, fit, criterion })
+        });
+        fits.chain([found.clone()]).min_by(|one, other| one.criterion.total_cmp(&other.criterion))
     }
 
     /// Iterates corrections of the data and linear fits until the values no longer change.

@@ -6,6 +6,7 @@
 //! noise and no other cause comes near; else those that remain are listed.
 
 mod candidates;
+mod change_time;
 mod fit;
 mod focal_grid;
 mod focal_period;
@@ -13,15 +14,17 @@ mod image_order;
 
 use rayon::prelude::*;
 
-use self::candidates::{candidates, intrinsics, radial};
+use self::candidates::{candidates, intrinsics, other_axes, radial, since};
+use self::change_time::change_s;
 use self::fit::{Fitted, Fitter, Hypothesis, length_s};
 use self::focal_grid::FocalGrid;
 use self::focal_period::LinearModels;
 use super::data::RotationData;
 use super::fit::RotationFit;
-use crate::faults::{Explanation as _, Fault, FaultKind, MOST_REMAINING, Sentence, Subject};
+use crate::faults::{Explanation as _, Fault, FaultKind, MOST_REMAINING, Sensor, Sentence, Subject};
 use crate::geometry::SignedAxes;
 use crate::gimbal::ClassicalChain;
+use crate::log_check::report::suspects::Suspects;
 use crate::log_check::report::{Area, Findings, Severity};
 use crate::sensors::CameraMount;
 
@@ -61,19 +64,22 @@ pub(in crate::log_check) struct WithinNoise {
     pub(in crate::log_check) more_likely: usize,
 }
 
-/// Searches for the cause of a misfit between the rotations of a camera and their prediction by a chain. An orientation
-/// that differs from the rig's by more than the tolerance counts as a fault.
+/// Searches for the cause of a misfit between the rotations of a camera and their prediction by a chain, among the faults of the
+/// suspects. An orientation that differs from the rig's by more than the tolerance counts as a fault.
 pub(in crate::log_check) fn explain(
     data: &RotationData<'_>,
     chain: &ClassicalChain,
+    suspects: &Suspects,
     orientation_tolerance_rad: f64,
 ) -> Outcome {
-    let Some(mut comparison) = Comparison::new(data, chain, orientation_tolerance_rad) else {
+    let Some(mut comparison) = Comparison::new(data, chain, suspects, orientation_tolerance_rad) else {
         return Outcome::Open(Vec::new());
     };
-    comparison.fitted.extend(image_order::fit(&comparison.fitter));
-    Fitted::sort(&mut comparison.fitted);
-    comparison.add_intrinsics();
+    if suspects.include(Sensor::Camera) {
+        comparison.fitted.extend(image_order::fit(&comparison.fitter));
+        Fitted::sort(&mut comparison.fitted);
+        comparison.add_intrinsics();
+    }
     comparison.explanation()
 }
 
@@ -81,10 +87,11 @@ pub(in crate::log_check) fn explain(
 pub(in crate::log_check) fn explain_within_noise(
     data: &RotationData<'_>,
     chain: &ClassicalChain,
+    suspects: &Suspects,
     orientation_tolerance_rad: f64,
 ) -> WithinNoise {
     let none = WithinNoise { decisive: None, instead_of_orientation: Vec::new(), more_likely: 0 };
-    let Some(comparison) = Comparison::new(data, chain, orientation_tolerance_rad) else { return none };
+    let Some(comparison) = Comparison::new(data, chain, suspects, orientation_tolerance_rad) else { return none };
     let given = comparison.criterion_given();
     let explains = |found: &&Fitted| found.fit.is_explained() && found.fault.is_noticeable();
     let is_decisive =
@@ -115,11 +122,17 @@ pub(in crate::log_check) fn explain_within_noise(
 /// Cause that a fit describes, in words and with its value.
 fn cause(data: &RotationData<'_>, found: &Fitted) -> NamedCause {
     let kind = found.fault.kind;
-    let fault = if kind == FaultKind::GyroscopeAxes {
+    let fault = if found.fault == Fault::left_handed() {
         recorded_axes(data, found).map(|axes| Fault::of_axes(kind, axes))
     } else {
         Some(found.fault.clone().of_camera(&data.camera.key))
     };
+    let fault = fault.map(|fault| {
+        let is_turned = fault.axes().is_some_and(|axes| !axes.is_left_handed());
+        // An accelerometer with the axes of the gyroscope has its wrong ones, too.
+        let is_of_imu = kind == FaultKind::GyroscopeAxes && fault.since_s.is_none() && data.imu_facts.axes_agree;
+        if is_of_imu && is_turned { Fault { kind: FaultKind::ImuAxes, ..fault } } else { fault }
+    });
     let subject = Subject { rig: data.rig, camera_key: &data.camera.key };
     let without_axes = Fault::from(kind);
     let sentence = subject.sentence(fault.as_ref().unwrap_or(&without_axes));
@@ -147,13 +160,30 @@ struct Comparison<'a> {
 }
 
 impl<'a> Comparison<'a> {
-    /// Fits all hypotheses but those about intrinsics; `None` without enough rotations.
-    fn new(data: &'a RotationData<'a>, chain: &'a ClassicalChain, orientation_tolerance_rad: f64) -> Option<Self> {
+    /// Fits all hypotheses about the suspects but those about intrinsics; `None` without enough rotations.
+    fn new(
+        data: &'a RotationData<'a>,
+        chain: &'a ClassicalChain,
+        suspects: &Suspects,
+        orientation_tolerance_rad: f64,
+    ) -> Option<Self> {
         let fitter = Fitter::new(data, chain, orientation_tolerance_rad);
         let given = fitter.fit_given()?;
+        let mut all = candidates(data, chain);
+        // Both an IMU and a camera that are turned explain the same rotations, and the camera's turn is more likely.
+        if suspects.are_only(Sensor::Imu) {
+            all.push(other_axes());
+        }
+        if let Some(change_s) = change_s(&fitter) {
+            all = since(all, change_s);
+        }
+        all.retain(|hypothesis| hypothesis.starts().iter().any(|fault| suspects.allow(fault)));
         let mut comparison = Self { data, fitter, given, fitted: Vec::new() };
-        comparison.add(candidates(data, chain));
+        comparison.add(all);
         Fitted::sort(&mut comparison.fitted);
+        if let Some(refined) = comparison.fitted.first().and_then(|best| comparison.fitter.at_best_time(best)) {
+            comparison.fitted[0] = refined;
+        }
         Some(comparison)
     }
 
@@ -230,11 +260,16 @@ impl<'a> Comparison<'a> {
             let improves = is_explained && found.fit.misfit_rad < MIN_IMPROVEMENT * given.misfit_rad
                 || found.fit.mean_square < UNEXPLAINED_IMPROVEMENT * given.mean_square;
             let (cause, evidence) = self.describe(found);
+            let key = |cause: &NamedCause| cause.fault.as_ref().map(|fault| (fault.kind, fault.choice));
+            let is_listed = |listed: &NamedCause| {
+                listed.sentence.statement == cause.sentence.statement
+                    || (cause.area == Area::Imu && key(listed) == key(&cause))
+            };
             if remains
                 && improves
                 && is_less(found)
                 && open.len() < MOST_REMAINING
-                && open.iter().all(|(listed, _)| listed.sentence.statement != cause.sentence.statement)
+                && !open.iter().any(|(listed, _)| is_listed(listed))
             {
                 open.push((cause, evidence));
             }
