@@ -55,7 +55,7 @@ pub(super) fn isolate(compared: &Compared<'_>, rotations: Rotations, findings: &
     let truth = truth.filter(|_| !suspected.contains(&Source::GroundTruth));
     let motion = truth.map_or_else(Vec::new, |truth| compared.motion(&truth, &suspected, findings));
     if let Some(mut of_motion) = Statement::of(&motion_culprits(&motion), &motion, compared.rig) {
-        exclude_causes(&mut of_motion, &motion, findings);
+        exclude_pairs(&mut of_motion, findings);
         of_motion.join_axes(findings, compared.rig);
         statements.push(of_motion);
     }
@@ -301,29 +301,9 @@ fn fit_of_directions(angles_rad: &[[f64; 2]]) -> Option<Fit> {
 /// Removes causes, found by the rotations of one camera, of sensors that agree with others although the isolated ones do
 /// not.
 fn exclude_causes(statement: &mut Statement, pairs: &[Pair], findings: &mut Findings) {
+    exclude_pairs(statement, findings);
     if !statement.is_isolated {
         return;
-    }
-    // Two sources that disagree are blamed by the third one.
-    let mut excluded = match statement.suspected.as_slice() {
-        [Source::Gyroscope] => {
-            let begins = statement.interval.since_s.is_some();
-            // Late angular rates are early images.
-            let is_late = statement.has_value && statement.parameter == Some(Parameter::Delay);
-            findings.retract_by_pair(Measurement::Gyroscope, |finding| {
-                if finding.faults.iter().any(|fault| fault.kind == FaultKind::CameraClock) {
-                    is_late
-                } else {
-                    statement.has_value || begins || finding.area != Area::Imu
-                }
-            })
-        }
-        [Source::Accelerometer] => findings.retract_by_pair(Measurement::Accelerometer, |_| true),
-        [Source::GroundTruth] => findings.retract_by_pair(Measurement::Gyroscope, |finding| finding.area == Area::Imu),
-        _ => Vec::new(),
-    };
-    if excluded.iter().flat_map(|finding| &finding.faults).any(|it| it.kind == FaultKind::AccelerometerAxes) {
-        findings.include(Measurement::Accelerometer);
     }
     let agreeing: Vec<&Source> =
         pairs.iter().filter(|pair| pair.fit.disagrees.is_none()).flat_map(|pair| &pair.sources).collect();
@@ -339,13 +319,40 @@ fn exclude_causes(statement: &mut Statement, pairs: &[Pair], findings: &mut Find
         let changes = |fault: &Fault| fault.since_s.is_some() || fault.kind == FaultKind::FocalPieces;
         statement.is_measured_change && !finding.faults.iter().any(changes)
     };
-    excluded.extend(findings.retract_misfits(|finding| {
+    let excluded = findings.retract_misfits(|finding| {
         !finding.faults.is_empty() && (statement.is_cause || is_constant(finding) || is_excluded(finding))
-    }));
-    for finding in excluded {
-        statement.evidence.push_str("; excluded: ");
-        statement.evidence.push_str(&finding.title);
+    });
+    statement.add_excluded(&excluded);
+}
+
+/// Removes findings by comparisons of two sources, of which a third one blames the other.
+fn exclude_pairs(statement: &mut Statement, findings: &mut Findings) {
+    let excluded = match statement.suspected.as_slice() {
+        [Source::Gyroscope] if statement.is_isolated => {
+            let begins = statement.interval.since_s.is_some();
+            // Late angular rates are early images.
+            let is_late = statement.has_value && statement.parameter == Some(Parameter::Delay);
+            findings.retract_by_pair(Measurement::Gyroscope, |finding| {
+                if finding.faults.iter().any(|fault| fault.kind == FaultKind::CameraClock) {
+                    is_late
+                } else {
+                    statement.has_value || begins || finding.area != Area::Imu
+                }
+            })
+        }
+        [Source::GroundTruth] if statement.is_isolated => {
+            findings.retract_by_pair(Measurement::Gyroscope, |finding| finding.area == Area::Imu)
+        }
+        suspected if suspected.contains(&Source::Accelerometer) && (statement.is_isolated || statement.is_cause) => {
+            let is_replaced = |finding: &Finding| statement.is_cause || finding.area == Area::Log;
+            findings.retract_by_pair(Measurement::Accelerometer, is_replaced)
+        }
+        _ => Vec::new(),
+    };
+    if excluded.iter().flat_map(|finding| &finding.faults).any(|it| it.kind == FaultKind::AccelerometerAxes) {
+        findings.include(Measurement::Accelerometer);
     }
+    statement.add_excluded(&excluded);
 }
 
 /// True if a finding with a cause is about one of the suspected sources, and for a change whose value is measured about its

@@ -11,7 +11,7 @@ use super::source::Source;
 use crate::faults::{Area, Fault, FaultKind, Sentence, Severity, Subject};
 use crate::geometry::{SignedAxes, so3};
 use crate::log_check::report::agreement::Quantity;
-use crate::log_check::report::{FindingInterval, Findings};
+use crate::log_check::report::{Finding, FindingInterval, Findings};
 use crate::sensors::Rig;
 
 /// Largest error with which the factor on a missing term is one.
@@ -124,6 +124,14 @@ impl Statement {
             _ => format!("{} disagree with each other{times}", all_of(&names, "and")),
         };
         Some(statement)
+    }
+
+    /// Adds findings that are excluded to the evidence.
+    pub(super) fn add_excluded(&mut self, excluded: &[Finding]) {
+        for finding in excluded {
+            self.evidence.push_str("; excluded: ");
+            self.evidence.push_str(&finding.title);
+        }
     }
 
     /// Names the cause with its value.
