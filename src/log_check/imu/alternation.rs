@@ -12,7 +12,7 @@ use crate::log_check::statistics::median;
 const MIN_SAMPLES: usize = 400;
 /// Parts of the log, in each of which the sources must differ alike.
 const PARTS: usize = 4;
-/// Samples to either side over which a derivative is measured, an odd number: those of the other source, like the neighbours.
+/// Samples to either side over which a derivative is measured, an odd number: the other source has them, like the neighbours.
 const HALF_SLOPE: usize = 5;
 /// Part of the difference over the whole log that each part must have.
 const ALIKE: f64 = 0.5;
@@ -34,15 +34,20 @@ struct Difference {
     delay_sigma_s: f64,
 }
 
-/// Reports a sensor, 0 for the gyroscope and 1 for the accelerometer, whose samples are those of two sources in turns; true if
-/// they are.
+impl Difference {
+    /// True for values that differ, of sensor 0 or 1.
+    fn is_value(&self, sensor: usize) -> bool {
+        self.value.norm() > SMALLEST[sensor].max(SIGNIFICANT_SIGMAS * self.value_sigma)
+    }
+}
+
+/// Reports a sensor, 0 for the gyroscope and 1 for the accelerometer, whose samples two sources take in turns; true if they do.
 pub(super) fn check_alternation(samples: &[Stamped], sensor: usize, findings: &mut Findings) -> bool {
     let (name, unit) = [("gyroscope", "rad/s"), ("accelerometer", "m/s²")][sensor];
     let Some(found) = difference(samples, sensor) else { return false };
     let Difference { value, delay_s, .. } = found;
-    let differs = value.norm() > SMALLEST[sensor].max(SIGNIFICANT_SIGMAS * found.value_sigma);
     let of_value = format!("({:+.3}, {:+.3}, {:+.3}) {unit}", value.x, value.y, value.z);
-    let text = if differs {
+    let text = if found.is_value(sensor) {
         format!("they differ by {of_value}")
     } else {
         format!("one is {:.0} ms late", 1e3 * delay_s.abs())
@@ -67,8 +72,8 @@ fn difference(samples: &[Stamped], sensor: usize) -> Option<Difference> {
     }
     let all = fit(samples)?;
     let parts: Vec<Difference> = samples.chunks(samples.len().div_ceil(PARTS)).filter_map(fit).collect();
-    let is_value = all.value.norm() > SMALLEST[sensor].max(SIGNIFICANT_SIGMAS * all.value_sigma)
-        && parts.iter().all(|part| part.value.dot(&all.value) > ALIKE * all.value.norm_squared());
+    let is_value =
+        all.is_value(sensor) && parts.iter().all(|part| part.value.dot(&all.value) > ALIKE * all.value.norm_squared());
     let is_delay = all.delay_s.abs() > SMALLEST_DELAY_S.max(SIGNIFICANT_SIGMAS * all.delay_sigma_s)
         && parts.iter().all(|part| part.delay_s * all.delay_s > ALIKE * all.delay_s.powi(2));
     (is_value || is_delay).then_some(all)

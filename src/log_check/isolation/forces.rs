@@ -47,9 +47,8 @@ const SMALL_MISFIT: f64 = 0.3;
 const SMALLEST_MISFIT: f64 = 0.1;
 /// Ratio of the misfit of a fault that begins at a time to the misfit of one that acts in the whole log up to which it precedes.
 const BEGINS_RATIO: f64 = 0.8;
-/// Delays of the accelerometer that are tried, in seconds, and the smallest one that is reported.
-const DELAYS_S: [f64; 10] = [-0.1, -0.075, -0.05, -0.03, -0.015, 0.015, 0.03, 0.05, 0.075, 0.1];
-const WRONG_DELAY_S: f64 = 0.02;
+/// Delays of the accelerometer that are tried, in seconds.
+const DELAYS_S: [f64; 8] = [-0.1, -0.075, -0.05, -0.03, 0.03, 0.05, 0.075, 0.1];
 
 /// Means over a window, in the world of the ground truth.
 struct Window {
@@ -115,7 +114,7 @@ struct Forces {
 /// Compares the accelerometer with poses whose body has the axes `body_from_imu`, and whose stamps are those of the IMU less
 /// `delay_s`. The fit has a fault of the accelerometer, or another frame or delay of it, if it explains the differences far better.
 pub(super) fn compare(compared: &Compared<'_>, body_from_imu: &UnitQuaternion<f64>, delay_s: f64) -> Option<Fit> {
-    let with = |delay_s: f64, frame: Frame| Forces::of(compared, body_from_imu, delay_s, 0.0, frame);
+    let with = |delay_s: f64, frame: Frame| Forces::of(compared, body_from_imu, delay_s, frame);
     let forces = with(delay_s, Frame::Imu)?;
     let mut fit = forces.fit()?;
     let given = forces.misfit(&as_recorded, &Matrix3::identity())?;
@@ -127,15 +126,13 @@ pub(super) fn compare(compared: &Compared<'_>, body_from_imu: &UnitQuaternion<f6
         Some(Explained { misfit, change: Some(Change { parameter, values: Vec::new() }), fault: None })
     };
     let of_delay = |later_s: f64| {
-        let misfit = Forces::of(compared, body_from_imu, delay_s, later_s, Frame::Imu)?
-            .misfit(&as_recorded, &Matrix3::identity())?;
+        let misfit = with(delay_s + later_s, Frame::Imu)?.misfit(&as_recorded, &Matrix3::identity())?;
         let change = Change { parameter: Parameter::Delay, values: vec![-later_s] };
-        (later_s.abs() > WRONG_DELAY_S).then_some(Explained { misfit, change: Some(change), fault: None })
+        Some(Explained { misfit, change: Some(change), fault: None })
     };
     let frames = [(Frame::World, Parameter::WorldAxes), (Frame::Level, Parameter::LevelAxes)];
     let all = frames.into_iter().filter_map(of_frame).chain(DELAYS_S.into_iter().filter_map(of_delay));
-    let least = |all: &mut dyn Iterator<Item = Explained>| all.min_by(|a, b| a.misfit.total_cmp(&b.misfit));
-    let best = least(&mut all.chain(forces.fault(&fit)));
+    let best = least(all.chain(forces.fault(&fit)));
     // At a constant heading, other axes of positions and of the accelerometer are the same.
     let largest = best.as_ref().map_or(f64::INFINITY, |best| BEGINS_RATIO * best.misfit);
     let best = forces.axes_of_positions().filter(|it| it.misfit < largest).or(best);
@@ -152,26 +149,25 @@ pub(super) fn compare(compared: &Compared<'_>, body_from_imu: &UnitQuaternion<f6
     Some(fit)
 }
 
+/// The explanation that leaves least.
+fn least(all: impl Iterator<Item = Explained>) -> Option<Explained> {
+    all.min_by(|one, other| one.misfit.total_cmp(&other.misfit))
+}
+
 fn as_recorded(_: f64) -> Matrix3<f64> {
     Matrix3::identity()
 }
 
 impl Forces {
-    /// Windows with the specific forces of a frame, whose stamps are `later_s` later than the stamps of the angular rates.
-    fn of(
-        compared: &Compared<'_>,
-        body_from_imu: &UnitQuaternion<f64>,
-        delay_s: f64,
-        later_s: f64,
-        frame: Frame,
-    ) -> Option<Self> {
+    /// Windows with the specific forces of a frame, whose stamps are the stamps of the poses plus `delay_s`.
+    fn of(compared: &Compared<'_>, body_from_imu: &UnitQuaternion<f64>, delay_s: f64, frame: Frame) -> Option<Self> {
         let poses = compared.poses;
         let steps_s: Vec<f64> = poses.windows(2).map(|pair| seconds_from_ns(pair[1].0 - pair[0].0)).collect();
         let (first, last) = (poses.first()?, poses.last()?);
         if median(&steps_s) > MAX_SPACING_S {
             return None;
         }
-        let delay_ns = ns_from_seconds(delay_s + later_s);
+        let delay_ns = ns_from_seconds(delay_s);
         let starts = (1..).map(|number| first.0 + number * WINDOW_NS);
         let windows: Vec<Window> = starts
             .take_while(|start_ns| start_ns + WINDOW_NS + HALF_VELOCITY_NS <= last.0)
@@ -250,7 +246,7 @@ impl Forces {
             let change = Change { parameter: Parameter::PositionAxes, values: matrix.iter().copied().collect() };
             Some(Explained { misfit: self.misfit(&as_recorded, &matrix)?, change: Some(change), fault: None })
         };
-        SignedAxes::all().skip(1).filter_map(explained).min_by(|a, b| a.misfit.total_cmp(&b.misfit))
+        least(SignedAxes::all().skip(1).filter_map(explained))
     }
 
     /// Axes or unit of the accelerometer that leave least, in the whole log or from a time on.
@@ -271,10 +267,9 @@ impl Forces {
             let misfit = root_mean_square(&misfits(fault, since_s)?);
             Some(Explained { misfit, change: None, fault: Some(Fault { since_s, ..fault.clone() }) })
         };
-        let least = |all: &mut dyn Iterator<Item = Explained>| all.min_by(|a, b| a.misfit.total_cmp(&b.misfit));
-        let whole = least(&mut faults.iter().filter_map(|fault| explained(fault, None)));
+        let whole = least(faults.iter().filter_map(|fault| explained(fault, None)));
         let begun = least(
-            &mut faults
+            faults
                 .iter()
                 .flat_map(|fault| times_s.iter().map(move |at_s| (fault, *at_s)))
                 .filter_map(|(fault, at_s)| explained(fault, Some(at_s))),

@@ -17,7 +17,7 @@ use crate::sensors::{AngularRates, CameraMount};
 const FRAME_RATIO: f64 = 0.1;
 
 impl Compared<'_> {
-    /// Statement about a suspected source that agrees with another one if its measurements are those of another frame.
+    /// Statement about a suspected source that agrees with another one if its measurements belong to another frame.
     pub(super) fn other_frame(&self, suspected: &[&Source], pairs: &[Pair]) -> Option<Statement> {
         suspected.iter().find_map(|source| match source {
             Source::Gyroscope => self.rates_in_world(pairs),
