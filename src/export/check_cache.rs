@@ -9,7 +9,7 @@ use super::masks;
 use super::result_cache::{CachedFile, ResultCache, ResultKey, ResultKeyBuilder};
 use crate::faults::Fault;
 use crate::flight_log::FlightLog;
-use crate::log_check::{CheckReport, ProposedMask};
+use crate::log_check::{Basis, CheckReport, ProposedMask};
 use crate::sensors::{GrayImage, ImageMask, RequiredAccuracy, Rig};
 use crate::session;
 
@@ -22,8 +22,8 @@ const BLOCK_BYTES: usize = 1 << 20;
 #[derive(Serialize, Deserialize)]
 struct StoredReport<R> {
     report: R,
-    /// By finding: `is_assumption` and `faults`.
-    beside: Vec<(bool, Vec<Fault>)>,
+    /// By finding: `basis` and `faults`.
+    beside: Vec<(Basis, Vec<Fault>)>,
 }
 
 /// Result of the check of a log and its rig, from the cache if the program has checked them before.
@@ -65,7 +65,7 @@ fn key(log: &FlightLog, rig: &Rig) -> Option<ResultKey> {
 
 /// Files from which [`report_of`] makes an equal report; `None` if there are none, because a number is not finite.
 fn files_of(report: &CheckReport) -> Option<Vec<CachedFile>> {
-    let beside = report.findings.iter().map(|finding| (finding.is_assumption, finding.faults.clone())).collect();
+    let beside = report.findings.iter().map(|finding| (finding.basis, finding.faults.clone())).collect();
     let mut files = vec![(REPORT.to_owned(), serde_json::to_vec(&StoredReport { report, beside }).ok()?)];
     for proposed in &report.proposed_masks {
         files.push((proposed.camera_key.clone(), masks::png(&proposed.mask).ok()?));
@@ -80,8 +80,8 @@ fn report_of(files: &[CachedFile]) -> Option<CheckReport> {
     if name != REPORT || beside.len() != report.findings.len() {
         return None;
     }
-    for (finding, (is_assumption, faults)) in report.findings.iter_mut().zip(beside) {
-        (finding.is_assumption, finding.faults) = (is_assumption, faults);
+    for (finding, (basis, faults)) in report.findings.iter_mut().zip(beside) {
+        (finding.basis, finding.faults) = (basis, faults);
     }
     for (camera_key, png) in masks {
         let image = image::load_from_memory_with_format(png, ImageFormat::Png).ok()?.into_luma8();
@@ -126,14 +126,14 @@ mod tests {
                 .of_camera("cam1")
                 .of_joints(&["yaw".to_owned()]),
         ];
-        let finding = |severity, is_assumption, faults| Finding {
+        let finding = |severity, basis, faults| Finding {
             severity,
             area: Area::Imu,
             title: "a \"title\" of ±3°".to_owned(),
             evidence: "3 of 7".to_owned(),
             remedy: String::new(),
             interval: FindingInterval { since_s: Some(0.1 + 0.2), until_s: None },
-            is_assumption,
+            basis,
             faults,
         };
         let image = GrayImage { width: 3, height: 2, pixels: vec![255, 0, 0, 255, 255, 0] };
@@ -143,7 +143,10 @@ mod tests {
             epoch_ns: i64::MAX - 7,
             duration_s: 14.3 / 3.0,
             topics: Vec::new(),
-            findings: vec![finding(Severity::Error, false, faults), finding(Severity::Warning, true, Vec::new())],
+            findings: vec![
+                finding(Severity::Error, Basis::Measured, faults),
+                finding(Severity::Warning, Basis::Assumed, Vec::new()),
+            ],
             agreement: Agreement::default(),
             proposed_masks: vec![ProposedMask { camera_key: "cam0".to_owned(), mask: ImageMask::from_image(&image) }],
         }

@@ -35,5 +35,5 @@ pub use self::report::agreement::{Agreement, PairAgreement, Quantity};
 pub(crate) use self::report::verdict::MOST_LIKELY;
 pub use self::report::verdict::{Trust, Verdict, joint_statement, problems};
 pub use self::report::{
-    Area, CheckReport, Finding, FindingInterval, ImageRotation, ProposedMask, Severity, TopicReport,
+    Area, Basis, CheckReport, Finding, FindingInterval, ImageRotation, ProposedMask, Severity, TopicReport,
 };

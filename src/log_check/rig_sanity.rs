@@ -1,7 +1,7 @@
 use nalgebra::Vector2;
 
 use super::extrinsics::MAX_LEVER_M;
-use super::report::{Area, CheckReport, Finding, FindingInterval, Findings, Severity};
+use super::report::{Area, Basis, CheckReport, Finding, FindingInterval, Findings, Severity};
 use crate::camera::{CameraModel, Projection};
 use crate::flight_log::FlightLog;
 use crate::sensors::{AssumedField, CameraRig, ChainPrior, GimbalRig, Rig};
@@ -42,7 +42,7 @@ impl CheckReport {
             evidence: keys.join(", "),
             remedy: String::new(),
             interval: FindingInterval::default(),
-            is_assumption: false,
+            basis: Basis::Measured,
             faults: Vec::new(),
         };
         self.findings.insert(place.unwrap_or(self.findings.len()), note);

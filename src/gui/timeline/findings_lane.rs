@@ -134,7 +134,7 @@ mod tests {
     use crate::gui::theme::ThemeName;
     use crate::gui::timeline::TimelinePanel;
     use crate::gui::{Panel as _, Selection};
-    use crate::log_check::{Finding, FindingInterval};
+    use crate::log_check::{Basis, Finding, FindingInterval};
     use crate::session::{FindingSource, Recording};
     use crate::text::Named as _;
 
@@ -146,7 +146,7 @@ mod tests {
             evidence: "3 of 7 images".to_owned(),
             remedy: "add light".to_owned(),
             interval: FindingInterval { since_s: times[0], until_s: times[1] },
-            is_assumption: false,
+            basis: Basis::Measured,
             faults: Vec::new(),
         }
     }

@@ -190,7 +190,7 @@ mod tests {
     use crate::faults::{Area, Fault, FaultKind, Severity};
     use crate::gui::PanelName;
     use crate::gui::window::tests::{Bench, SECOND_NS, bench, bench_of, commands_of, sample};
-    use crate::log_check::{Finding, FindingInterval};
+    use crate::log_check::{Basis, Finding, FindingInterval};
     use crate::session::{Answer, Command};
 
     #[test]
@@ -220,7 +220,7 @@ mod tests {
             evidence: String::new(),
             remedy: String::new(),
             interval: FindingInterval { since_s: Some(2.0), until_s: Some(3.5) },
-            is_assumption: false,
+            basis: Basis::Measured,
             faults: Vec::new(),
         }]));
         let mut harness = bench_of(recording, [1600.0, 900.0]);
@@ -274,7 +274,7 @@ mod tests {
             evidence: "rotations differ by 2.6°".to_owned(),
             remedy: "reverse the sign of the readings of 'yaw' in the driver".to_owned(),
             interval: FindingInterval::default(),
-            is_assumption: false,
+            basis: Basis::Measured,
             faults: vec![Fault::from(FaultKind::JointReversed).of_joints(&["yaw".to_owned()])],
         }]));
         let label = format!("{}  ✖ Not usable: {title}", recording.runs[0].spec.label);

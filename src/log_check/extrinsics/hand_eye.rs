@@ -17,7 +17,7 @@ use crate::log_check::report::verdict::MOST_LIKELY;
 use crate::log_check::report::{Area, Findings, ImageRotation, Measurement, Severity};
 use crate::log_check::rotations::data::{JOINED_S, RotationData, joined};
 use crate::log_check::rotations::fit::{FREE_ORIENTATION_RAD, FitPriors, RotationFit, RotationPair};
-use crate::log_check::rotations::hypotheses::{self, Outcome, WithinNoise};
+use crate::log_check::rotations::hypotheses::{self, LensValue, WithinNoise};
 use crate::log_check::statistics::{SIGNIFICANT_SIGMAS, median};
 use crate::sensors::{CameraMount, CameraRig};
 
@@ -98,7 +98,7 @@ pub(super) fn check_against_gyroscope(
     if let Some(faulty) = faulty {
         let title = format!("the rotations of {} are not compared", camera.key);
         let evidence = format!("the fault of the {faulty} is reported above");
-        findings.add(Severity::Note, Area::Extrinsics, title, evidence, "check again when it is corrected");
+        findings.unverified(Area::Extrinsics, title, evidence, "check again when it is corrected");
         return HandEyeOutcome::Other;
     }
     let hand_eye = HandEye { data, camera, suspects };
@@ -108,7 +108,7 @@ pub(super) fn check_against_gyroscope(
     if given.len() < MIN_ROTATIONS || rotation_rad < MIN_ROTATION_RAD {
         let title = format!("too little rotation of {} to check its extrinsics", camera.key);
         let evidence = format!("{} image rotations, {:.2}° in the median", given.len(), rotation_rad.to_degrees());
-        findings.add(Severity::Note, Area::Extrinsics, title, evidence, "rotate about all axes");
+        findings.unverified(Area::Extrinsics, title, evidence, "rotate about all axes");
         return HandEyeOutcome::Other;
     }
     let aligned = hand_eye.aligned(&chain);
@@ -134,7 +134,7 @@ pub(super) fn check_against_gyroscope(
         hypotheses::explain_within_noise(&hand_eye.data.delayed(offset_s), &chain, suspects, tolerance_rad(&fit))
     });
     // A fault in a part of the log also changes the time offset that fits best.
-    let is_sound = within_noise.as_ref().is_some_and(|found| found.decisive.is_none());
+    let is_sound = within_noise.as_ref().is_some_and(|found| found.found.is_none());
     hand_eye.report_time_offset(aligned, is_sound, findings);
     hand_eye.report_orientation(&fit, &pairs, &chain, offset_s, within_noise, findings)
 }
@@ -255,15 +255,15 @@ impl HandEye<'_> {
             }
             return HandEyeOutcome::Other;
         };
-        if let Some((cause, of_cause)) = found.decisive {
-            Outcome::Decisive(Box::new(cause), of_cause).report(key, &evidence, "", findings);
+        if let Some(found) = found.found {
+            found.report(key, &evidence, "", findings);
         } else if fit.spread < MIN_SPREAD {
             let title = format!("{key} rotated about one axis only: its orientation cannot be checked");
-            findings.add(Severity::Note, Area::Extrinsics, title, evidence, "rotate about all axes");
+            findings.unverified(Area::Extrinsics, title, evidence, "rotate about all axes");
         } else if sigma_rad > ORIENTATION_TOLERANCE_RAD {
             let title = format!("the rotations of {key} are predicted too inaccurately to check its orientation");
             let remedy = "noise of gyroscope or encoders is as large as the rotations: rotate faster or longer";
-            findings.add(Severity::Note, Area::Extrinsics, title, evidence, remedy);
+            findings.unverified(Area::Extrinsics, title, evidence, remedy);
         } else if error_rad > tolerance_rad {
             self.report_other_orientation(&fit.orientation, &found, evidence, findings);
             if let CameraMount::Static { imu_from_camera } = &self.camera.mount {
@@ -272,8 +272,22 @@ impl HandEye<'_> {
             }
         } else {
             findings.good(Area::Extrinsics, format!("the orientation of {key} agrees with the rig"), evidence);
+            self.report_unverified(&found.unverified, findings);
         }
         HandEyeOutcome::Other
+    }
+
+    /// Reports values of the lens whose errors no rotation shows.
+    fn report_unverified(&self, values: &[LensValue], findings: &mut Findings) {
+        if values.is_empty() {
+            return;
+        }
+        let names: Vec<&str> = values.iter().map(|value| value.name).collect();
+        let precisions: Vec<String> = values.iter().map(LensValue::precision).collect();
+        let title = format!("the rotations of {} do not verify its {}", self.camera.key, names.join(" and "));
+        let evidence = format!("{} rotations measure {}", self.data.measured.len(), precisions.join(", "));
+        let remedy = "rotate the camera itself, about all axes: a stabilized camera hardly rotates";
+        findings.unverified(Area::Intrinsics, title, evidence, remedy);
     }
 
     /// Reports an orientation of the camera against the rig, camera frame, with causes that explain it as well.

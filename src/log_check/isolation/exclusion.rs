@@ -5,7 +5,7 @@ use super::pair::Pair;
 use super::source::Source;
 use super::statement::{SAME_TIME_S, Statement};
 use crate::faults::{Fault, FaultKind, Sentence, Subject};
-use crate::log_check::report::{Area, Finding, Findings, Measurement, Severity};
+use crate::log_check::report::{Area, Basis, Finding, Findings, Measurement, Severity};
 use crate::sensors::Rig;
 
 /// Removes causes, found by the rotations of one camera, of sensors that agree with others although the isolated ones do
@@ -68,7 +68,7 @@ pub(super) fn exclude_pairs(statement: &mut Statement, findings: &mut Findings) 
 /// True if a finding with a cause is about one of the suspected sources, and for a change whose value is measured about its
 /// time.
 pub(super) fn is_explained(statement: &Statement, findings: &Findings) -> bool {
-    let is_cause = |finding: &&Finding| finding.severity >= Severity::Warning && !finding.is_assumption;
+    let is_cause = |finding: &&Finding| finding.severity >= Severity::Warning && finding.basis != Basis::Assumed;
     let has_time = |finding: &&Finding| {
         let since_s = finding.since_s().or(finding.interval.since_s);
         let (Some(since_s), Some(change_s)) = (since_s, statement.interval.since_s) else { return false };

@@ -21,6 +21,17 @@ use crate::geometry::seconds_from_ns;
 use crate::sensors::ImageMask;
 use crate::text::without_signed_zeros;
 
+/// What a finding is based on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Basis {
+    #[default]
+    Measured,
+    /// A value of the rig is only assumed, without a sign that it is wrong.
+    Assumed,
+    /// The measurements do not verify a value of the rig.
+    Unverified,
+}
+
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Finding {
     pub severity: Severity,
@@ -33,9 +44,8 @@ pub struct Finding {
     pub remedy: String,
     #[serde(flatten)]
     pub interval: FindingInterval,
-    /// True for a value of the rig that is only assumed, without a sign that it is wrong.
     #[serde(skip)]
-    pub is_assumption: bool,
+    pub basis: Basis,
     /// Faults with their values, of which one changes the estimates of a run; empty if none is known.
     #[serde(skip)]
     pub faults: Vec<Fault>,
@@ -169,13 +179,13 @@ impl Findings {
         remedy: impl Into<String>,
     ) {
         let [title, evidence, remedy] = [title.into(), evidence.into(), remedy.into()].map(without_signed_zeros);
-        self.push(severity, area, [title, evidence, remedy], false);
+        self.push(severity, area, [title, evidence, remedy], Basis::Measured);
     }
 
-    fn push(&mut self, severity: Severity, area: Area, texts: [String; 3], is_assumption: bool) {
+    fn push(&mut self, severity: Severity, area: Area, texts: [String; 3], basis: Basis) {
         let ([title, evidence, remedy], interval) = (texts, FindingInterval::default());
         let faults = Vec::new();
-        self.list.push(Finding { severity, area, title, evidence, remedy, interval, is_assumption, faults });
+        self.list.push(Finding { severity, area, title, evidence, remedy, interval, basis, faults });
     }
 
     /// States the time in which the finding that was added last holds, from the first to the last of some stamps in
@@ -274,7 +284,19 @@ impl Findings {
 
     /// Adds a warning about a value that is only assumed.
     pub(super) fn assumption(&mut self, area: Area, title: String, evidence: String, remedy: String) {
-        self.push(Severity::Warning, area, [title, evidence, remedy], true);
+        self.push(Severity::Warning, area, [title, evidence, remedy], Basis::Assumed);
+    }
+
+    /// Adds a note about something that the measurements do not verify.
+    pub(super) fn unverified(
+        &mut self,
+        area: Area,
+        title: impl Into<String>,
+        evidence: impl Into<String>,
+        remedy: impl Into<String>,
+    ) {
+        let texts = [title.into(), evidence.into(), remedy.into()].map(without_signed_zeros);
+        self.push(Severity::Note, area, texts, Basis::Unverified);
     }
 
     /// Excludes a measurement, whose fault is reported, from later comparisons.

@@ -4,7 +4,7 @@ use std::fmt::{Display, Formatter, Result};
 
 use serde::{Serialize, Serializer};
 
-use super::{Area, CheckReport, Finding, Severity};
+use super::{Area, Basis, CheckReport, Finding, Severity};
 use crate::text::{Named, counted, printable};
 
 /// Sentence about a log whose results nothing speaks against.
@@ -49,7 +49,7 @@ impl Trust {
     pub fn after(finding: &Finding) -> Self {
         match finding.severity {
             Severity::Error => Self::NotUsable,
-            Severity::Warning if !finding.is_assumption => Self::Doubtful,
+            Severity::Warning if finding.basis != Basis::Assumed => Self::Doubtful,
             Severity::Warning | Severity::Note | Severity::Good => Self::Trusted,
         }
     }
@@ -71,8 +71,9 @@ impl Trust {
 pub fn problems(findings: &[Finding]) -> Vec<&Finding> {
     let mut problems: Vec<&Finding> = findings.iter().filter(|it| it.severity >= Severity::Warning).collect();
     // Of one subject, a known cause precedes what may be its consequence.
-    problems
-        .sort_by_key(|it| (std::cmp::Reverse(it.severity), it.is_assumption, effect(it.area), it.faults.is_empty()));
+    problems.sort_by_key(|it| {
+        (std::cmp::Reverse(it.severity), it.basis == Basis::Assumed, effect(it.area), it.faults.is_empty())
+    });
     problems
 }
 
@@ -112,7 +113,12 @@ impl Verdict {
         let problems = problems(findings);
         let titles: Vec<&str> = problems.iter().map(|it| it.title.as_str()).collect();
         let sentence = match trust {
-            Trust::Trusted => format!("{} {NO_FAULT}", trust.mark()),
+            Trust::Trusted => {
+                let unverified = findings.iter().filter(|it| it.basis == Basis::Unverified);
+                let limits: Vec<&str> = unverified.map(|it| it.title.as_str()).collect();
+                let limits = limits.into_iter().fold(String::new(), |all, title| format!("{all}; {title}"));
+                format!("{} {NO_FAULT}{limits}", trust.mark())
+            }
             Trust::Doubtful | Trust::NotUsable => {
                 trust.sentence(problems.first().and_then(|it| it.since_s()), &joint_statement(&titles))
             }
@@ -174,14 +180,23 @@ mod tests {
             evidence: "3 of 7".to_owned(),
             remedy: format!("mend {title}"),
             interval: FindingInterval::default(),
-            is_assumption: false,
+            basis: Basis::Measured,
             faults: Vec::new(),
         }
     }
 
     #[test]
+    fn a_verdict_without_faults_says_what_is_not_verified() {
+        let unverified =
+            Finding { basis: Basis::Unverified, ..finding(Severity::Note, Area::Intrinsics, "no focal length") };
+        let verdict = Verdict::of(&[finding(Severity::Good, Area::Imu, "gravity"), unverified]);
+        assert_eq!((verdict.trust, verdict.warnings), (Trust::Trusted, 0));
+        assert_eq!(verdict.sentence, "✔ No fault found in the log and its rig; no focal length");
+    }
+
+    #[test]
     fn the_verdict_names_what_matters_most_first() {
-        let assumed = Finding { is_assumption: true, ..finding(Severity::Warning, Area::Imu, "noise") };
+        let assumed = Finding { basis: Basis::Assumed, ..finding(Severity::Warning, Area::Imu, "noise") };
         let mut findings = vec![
             finding(Severity::Note, Area::Log, "topics"),
             finding(Severity::Warning, Area::Images, "blur"),

@@ -106,8 +106,9 @@ pub(crate) struct RotationFit {
     /// χ² over its degrees of freedom, from the quantile of the pairs' χ².
     pub(crate) mean_square: f64,
     pub(crate) degrees_of_freedom: usize,
-    /// Values of the extra columns.
+    /// Values of the extra columns, and their standard deviations from the misfit.
     pub(crate) extra: Vec<f64>,
+    pub(crate) extra_sigmas: Vec<f64>,
     /// −2 times the logarithm of the likelihood of the misfits by a t distribution, without constants.
     pub(crate) deviance: f64,
     /// Sum of the squares of orientation and chain parameters in units of their prior standard deviations.
@@ -305,11 +306,14 @@ impl FitProblem {
         let degrees_of_freedom = (3 * rows.len()).saturating_sub(CHAIN).max(1);
         let norms: Vec<f64> = rows.iter().map(|row| row.residual(at).norm()).collect();
         let predicted: Vec<f64> = rows.iter().map(|row| MEDIAN_NORM_RATIO * row.covariance.trace().sqrt()).collect();
-        let extra = at.values.rows(at.values.len() - self.extra, self.extra).iter().copied().collect();
+        let first_extra = at.values.len() - self.extra;
+        let extra = at.values.rows(first_extra, self.extra).iter().copied().collect();
+        let level = mean_square.max(1.0);
+        let extra_sigmas = (first_extra..at.values.len()).map(|at| (covariance[(at, at)] * level).sqrt()).collect();
         let of_orientation = covariance.fixed_view::<3, 3>(0, 0).into_owned().symmetric_eigenvalues();
         Some(RotationFit {
             orientation: at.orientation,
-            orientation_sigma_rad: (of_orientation.max() * mean_square.max(1.0)).sqrt(),
+            orientation_sigma_rad: (of_orientation.max() * level).sqrt(),
             scale: 1.0 + at.values[SCALE],
             spread,
             misfit_rad: median(&norms),
@@ -318,6 +322,7 @@ impl FitProblem {
             mean_square,
             degrees_of_freedom,
             extra,
+            extra_sigmas,
             prior_square: self.prior_square(at),
             deviance: deviance(&squares) + rows.iter().map(|row| row.log_noise_ratio).sum::<f64>(),
         })

@@ -132,14 +132,14 @@ mod tests {
     use std::sync::atomic::AtomicBool;
 
     use super::*;
-    use crate::log_check::{Area, FindingInterval};
+    use crate::log_check::{Area, Basis, FindingInterval};
     use crate::session::plan::RunSpec;
     use crate::simulation::{SyntheticOptions, synthetic_tracks};
 
     fn finding(severity: Severity, faults: &[Fault]) -> Finding {
         let (title, evidence, remedy) = Default::default();
         let (area, interval, faults) = (Area::Time, FindingInterval::default(), faults.to_vec());
-        Finding { severity, area, title, evidence, remedy, interval, is_assumption: false, faults }
+        Finding { severity, area, title, evidence, remedy, interval, basis: Basis::Measured, faults }
     }
 
     /// Texts of the changes that undo faults in a run, and whether an error cannot be undone.

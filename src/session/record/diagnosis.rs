@@ -265,7 +265,7 @@ fn described(value: &AgreementValue) -> String {
 mod tests {
     use super::*;
     use crate::faults::{Area, Fault};
-    use crate::log_check::FindingInterval;
+    use crate::log_check::{Basis, FindingInterval};
 
     #[test]
     fn an_error_of_the_log_precedes_what_the_trials_say() {
@@ -276,7 +276,7 @@ mod tests {
             evidence: String::new(),
             remedy: "take an attitude whose heading does not step".to_owned(),
             interval: FindingInterval::default(),
-            is_assumption: false,
+            basis: Basis::Measured,
             faults: Vec::new(),
         };
         let mut diagnosis = Diagnosis {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::estimator::EventKind;
 use crate::faults::{Area, Fault, FaultKind, Severity};
-use crate::log_check::{Finding, FindingInterval, Trust};
+use crate::log_check::{Basis, Finding, FindingInterval, Trust};
 use crate::session::record::{Diagnosis, DiagnosisVerdict, RankedCause, RunRecord};
 use crate::session::result::{Answer, FindingSource};
 use crate::session::tests::memory::{estimated, recorded};
@@ -28,7 +28,7 @@ fn finding(severity: Severity, title: &str, faults: Vec<Fault>) -> Finding {
         evidence,
         remedy,
         interval: FindingInterval::default(),
-        is_assumption: false,
+        basis: Basis::Measured,
         faults,
     }
 }
@@ -78,7 +78,7 @@ fn a_fault_of_the_check_comes_first_where_the_run_uses_what_is_faulty() {
     let of = |title: &str| Answer::of(&rig, &[finding(Severity::Warning, title, Vec::new())], &run).findings.len();
     assert_eq!((of("some images of cam1 are blurred"), of("some images of cam0 are blurred")), (0, 1));
     // What the rig only assumes, and notes, are no reason to doubt.
-    let assumed = Finding { is_assumption: true, ..finding(Severity::Warning, "assumed", Vec::new()) };
+    let assumed = Finding { basis: Basis::Assumed, ..finding(Severity::Warning, "assumed", Vec::new()) };
     assert_eq!(answer(&flight, &[assumed, finding(Severity::Note, "note", Vec::new())], &run).trust, Trust::Trusted);
 }
 

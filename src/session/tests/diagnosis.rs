@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use crate::faults::{Area, Fault, FaultKind, Severity, correct_joint_angles};
-use crate::log_check::{Finding, FindingInterval};
+use crate::log_check::{Basis, Finding, FindingInterval};
 use crate::sensors::Rig;
 use crate::session::diagnosis::diagnose_run;
 use crate::session::engine::{History, OwnedStepInput, RunEngine, estimator_config};
@@ -66,7 +66,7 @@ fn error_of(fault: &Fault) -> Finding {
         evidence: String::new(),
         remedy: String::new(),
         interval: FindingInterval::default(),
-        is_assumption: false,
+        basis: Basis::Measured,
         faults: vec![fault.clone()],
     }
 }

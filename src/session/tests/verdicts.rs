@@ -2,7 +2,7 @@
 
 use crate::faults::{Area, Severity};
 use crate::gimbal::ParameterId;
-use crate::log_check::{Finding, FindingInterval, Trust};
+use crate::log_check::{Basis, Finding, FindingInterval, Trust};
 use crate::observability::Determination;
 use crate::session::record::{FlightParameter, FlightVerdicts, RunRecord};
 use crate::session::result::Answer;
@@ -31,7 +31,7 @@ fn warning(area: Area, title: &str) -> Finding {
         evidence: String::new(),
         remedy: "mount it softly".to_owned(),
         interval: FindingInterval::default(),
-        is_assumption: false,
+        basis: Basis::Measured,
         faults: Vec::new(),
     }
 }

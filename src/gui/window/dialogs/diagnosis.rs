@@ -107,7 +107,7 @@ mod tests {
     use crate::faults::{Area, FaultKind, Severity};
     use crate::gui::Dialog;
     use crate::gui::window::tests::{SECOND_NS, bench, commands_of};
-    use crate::log_check::{Finding, FindingInterval};
+    use crate::log_check::{Basis, Finding, FindingInterval};
     use crate::session::{Command, Diagnosis, DiagnosisProgress, DiagnosisVerdict, ForkChanges, RankedCause};
 
     fn diagnosis() -> Diagnosis {
@@ -138,7 +138,7 @@ mod tests {
                 evidence: String::new(),
                 remedy: "set gimbal.timeshift_gimbal_imu: -0.0810 in the rig, or run with timeshift=on".to_owned(),
                 interval: FindingInterval::default(),
-                is_assumption: false,
+                basis: Basis::Measured,
                 faults: Vec::new(),
             }],
             measured: false,

@@ -183,6 +183,12 @@ impl<'a> Fitter<'a> {
         self.linear_fit(None, 0, &self.priors)
     }
 
+    /// Changes of the values of a fault in a fit that is linear in them, with their standard deviations.
+    pub(super) fn linear_values(&self, fault: &Fault) -> Option<Vec<(f64, f64)>> {
+        let fit = self.linear_fit(Some(fault), fault.values.len(), &self.priors)?;
+        Some(fit.extra.into_iter().zip(fit.extra_sigmas).collect())
+    }
+
     /// Best fit of a hypothesis over its starts and times.
     pub(super) fn best(&self, hypothesis: Hypothesis) -> Option<Fitted> {
         let Hypothesis { starts, fitted, since_s, keeps_orientation } = hypothesis;
@@ -247,6 +253,12 @@ impl<'a> Fitter<'a> {
         let fit = self.linear_fit(Some(&fault), 0, priors)?;
         let criterion = self.criterion(&fit, fitted + usize::from(fault.since_s.is_some()));
         Some(Fitted { fault, fit, criterion })
+    }
+
+    /// Fit with a fault in the whole log that is known.
+    pub(super) fn with_fault(&self, fault: Fault) -> Option<Fitted> {
+        let parameters = fault.values.len();
+        self.evaluated(fault, parameters, &self.priors)
     }
 
     /// Best fit of a hypothesis about the lens, whose values are fitted to the rotations of `few`, which are some of these.

@@ -11,6 +11,7 @@ mod fit;
 mod focal_grid;
 mod focal_period;
 mod image_order;
+mod lens_precision;
 
 use rayon::prelude::*;
 
@@ -19,6 +20,7 @@ use self::change_time::change_s;
 use self::fit::{Fitted, Fitter, Hypothesis, length_s};
 use self::focal_grid::FocalGrid;
 use self::focal_period::LinearModels;
+pub(in crate::log_check) use self::lens_precision::LensValue;
 use super::data::RotationData;
 use super::fit::RotationFit;
 use crate::faults::{Explanation as _, Fault, FaultKind, MOST_REMAINING, Sensor, Sentence, Subject};
@@ -56,12 +58,14 @@ pub(in crate::log_check) enum Outcome {
 
 /// Causes of rotations that noise explains.
 pub(in crate::log_check) struct WithinNoise {
-    /// Cause with what it leaves, if it is much more likely than none.
-    pub(in crate::log_check) decisive: Option<(NamedCause, String)>,
+    /// Causes that are much more likely than none, if there are any.
+    pub(in crate::log_check) found: Option<Outcome>,
     /// Causes that explain the rotations as well as another orientation of the camera does, the most likely first.
     pub(in crate::log_check) instead_of_orientation: Vec<NamedCause>,
     /// Number of them that are more likely than another orientation.
     pub(in crate::log_check) more_likely: usize,
+    /// Values of the lens of which no rotation shows an error that makes results useless.
+    pub(in crate::log_check) unverified: Vec<LensValue>,
 }
 
 /// Searches for the cause of a misfit between the rotations of a camera and their prediction by a chain, among the faults of the
@@ -90,14 +94,21 @@ pub(in crate::log_check) fn explain_within_noise(
     suspects: &Suspects,
     orientation_tolerance_rad: f64,
 ) -> WithinNoise {
-    let none = WithinNoise { decisive: None, instead_of_orientation: Vec::new(), more_likely: 0 };
+    let lens = LensValue::measured(data, chain);
+    let unverified = lens.iter().filter(|value| value.is_unverified()).cloned().collect();
+    let none = WithinNoise { found: None, instead_of_orientation: Vec::new(), more_likely: 0, unverified };
     let Some(comparison) = Comparison::new(data, chain, suspects, orientation_tolerance_rad) else { return none };
     let given = comparison.criterion_given();
     let explains = |found: &&Fitted| found.fit.is_explained() && found.fault.is_noticeable();
     let is_decisive =
         |found: &&Fitted| found.criterion + DECISIVE_WITHIN_NOISE < given && found.removes_misfit(&comparison.given);
     if let Some(best) = comparison.fitted.first().filter(explains).filter(is_decisive) {
-        return WithinNoise { decisive: Some(comparison.describe(best)), ..none };
+        return WithinNoise { found: Some(comparison.decisive(best)), ..none };
+    }
+    if suspects.include(Sensor::Camera)
+        && let Some(found) = comparison.lens_within_noise(lens)
+    {
+        return WithinNoise { found: Some(found), ..none };
     }
     if !comparison.fitter.has_other_orientation(&comparison.given) {
         return none;
@@ -226,6 +237,30 @@ impl<'a> Comparison<'a> {
         Fitted::sort(&mut self.fitted);
     }
 
+    /// Another lens by rotations that noise explains: single rotations do not tell it, the sum of their information does. It must
+    /// be much more likely than the rig's and than each other cause, and must reduce the misfit.
+    fn lens_within_noise(&self, mut values: Vec<LensValue>) -> Option<Outcome> {
+        values.sort_by(|one, other| other.sigmas.total_cmp(&one.sigmas));
+        let best = values.first().filter(|value| value.is_contradicted())?;
+        let by_others = self.fitted.first().map_or(0.0, |other| self.criterion_given() - other.criterion).max(0.0);
+        if best.sigmas.powi(2) < by_others + DECISIVE {
+            return None;
+        }
+        let remain = values.iter().take_while(|value| value.sigmas.powi(2) + DECISIVE > best.sigmas.powi(2));
+        let fits = remain.filter_map(|value| self.fitter.with_fault(value.fault.clone()));
+        let fits: Vec<Fitted> = fits.filter(|found| found.fit.misfit_rad < self.given.misfit_rad).collect();
+        match fits.as_slice() {
+            [] => None,
+            [only] => Some(self.decisive(only)),
+            several => Some(Outcome::Open(several.iter().map(|found| self.describe(found)).collect())),
+        }
+    }
+
+    fn decisive(&self, found: &Fitted) -> Outcome {
+        let (cause, evidence) = self.describe(found);
+        Outcome::Decisive(Box::new(cause), evidence)
+    }
+
     /// Cause in words, with what it leaves.
     fn describe(&self, found: &Fitted) -> (NamedCause, String) {
         let compared = match length_s(self.fitter.chain) {
@@ -250,8 +285,7 @@ impl<'a> Comparison<'a> {
         let is_alone = best.rivals(fitted, DECISIVE).next().is_none();
         let is_less = |found: &Fitted| found.fit.misfit_rad < given.misfit_rad;
         if best.fit.is_explained() && is_less(best) && is_alone && best.criterion + DECISIVE < self.criterion_given() {
-            let (cause, evidence) = self.describe(best);
-            return Outcome::Decisive(Box::new(cause), evidence);
+            return self.decisive(best);
         }
         let mut open: Vec<(NamedCause, String)> = Vec::new();
         for found in fitted {
