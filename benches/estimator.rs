@@ -77,6 +77,7 @@ fn step(estimator: &mut Estimator, frame: &SyntheticFrame, encoder_sigma_rad: f6
         stamp_ns: frame.stamp_ns,
         imu: &frame.imu,
         imu_after: &[],
+        image_times_s: &[],
         gimbal_imu: &[],
         joint_angles: joint_angles.as_ref(),
         tracks: &frame.tracks,

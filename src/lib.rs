@@ -70,6 +70,7 @@
 //!         stamp_ns: frame.stamp_ns,
 //!         imu: &frame.imu,
 //!         imu_after: &[],
+//!         image_times_s: &[],
 //!         gimbal_imu: &[],
 //!         joint_angles: frame.encoder_angles(encoder_sigma_rad).as_ref(),
 //!         tracks: &frame.tracks,

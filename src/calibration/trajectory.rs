@@ -43,6 +43,7 @@ impl InitialTrajectory {
             stamp_ns: view.stamp_ns,
             imu: &view.imu,
             imu_after: &[],
+            image_times_s: &[],
             gimbal_imu: &[],
             joint_angles: None,
             tracks: &view.tracks,

@@ -48,6 +48,13 @@ pub(crate) struct SimulateArguments {
     /// Frame rate of the cameras in Hz.
     #[arg(long, value_name = "HZ", default_value_t = 20.0)]
     pub rate: f64,
+    /// Frame rate of the static camera in Hz [default: that of --rate].
+    #[arg(long, value_name = "HZ", conflicts_with = "no_static_camera")]
+    pub camera_rate: Option<f64>,
+    /// Time in milliseconds by which the images of the static camera are later than those of the gimbal camera: cameras
+    /// that are not triggered together.
+    #[arg(long, value_name = "MS", default_value_t = 0.0, conflicts_with = "no_static_camera")]
+    pub camera_phase: f64,
     /// Omit the static camera: half the computing time and half the file size.
     #[arg(long)]
     pub no_static_camera: bool,
@@ -65,7 +72,7 @@ pub(crate) struct SimulateArguments {
     pub motion: Option<PathBuf>,
     /// Fly a motion with the mechanism, cameras and noise of this rig. Its chain is the ground truth; the chain of the
     /// written rig has random errors within its prior.
-    #[arg(long, value_name = "FILE", requires = "motion", conflicts_with_all = ["size", "rate", "gimbal_imu"])]
+    #[arg(long, value_name = "FILE", requires = "motion", conflicts_with_all = ["size", "rate", "camera_rate", "gimbal_imu"])]
     pub rig: Option<PathBuf>,
     #[arg(long, value_name = "KEY=VALUE[,VALUE…]", help = disturb_help())]
     pub disturb: Vec<String>,
@@ -146,6 +153,8 @@ pub(crate) fn simulate(arguments: &SimulateArguments) -> Result<ExitOutcome> {
     options.duration_s = arguments.duration;
     options.resolution_px = arguments.size;
     options.camera_rate_hz = arguments.rate;
+    options.static_camera_rate_hz = arguments.camera_rate;
+    options.static_camera_phase_s = 1e-3 * arguments.camera_phase;
     options.static_camera = !arguments.no_static_camera;
     options.gimbal_imu_noise_scale = arguments.gimbal_imu;
     match arguments.encoder_sigma_deg {

@@ -238,6 +238,7 @@ fn window_camera<'a>(
     let [then_s, now_s] = clocks.shifts_s;
     let sensor = CameraCalibration {
         chain: Cow::Borrowed(chain),
+        camera,
         columns: if source.calibrated { chain.dof() + clocks.count } else { 0 },
         shift_s: then_s,
         shift_column: (source.calibrated && clocks.count > 0).then(|| chain.dof()),
@@ -255,7 +256,7 @@ fn window_camera<'a>(
         state.navigation.world_from_imu = frame.world_from_imu;
         state.navigation.velocity_m_per_s = frame.velocity_m_per_s;
         state.joints_rad.clone_from(&frame.joint_angles_rad);
-        let seen = camera_pose::state_at_exposure(&state, now_s);
+        let seen = camera_pose::state_at(&state, &state.rates.exposure(camera, now_s));
         let imu_from_observer = match rigid {
             Some((_, extrinsics)) => *extrinsics,
             // Without a time offset the reported camera pose applies.

@@ -10,13 +10,16 @@ pub struct StepInput<'a> {
     pub stamp_ns: i64,
     /// IMU samples from the previous image's stamp to this one's, both ends included and interpolated.
     pub imu: &'a [ImuSample],
-    /// IMU samples after the stamp (the first one at the stamp) while the rows of a rolling shutter are exposed; empty
-    /// if no run needs them.
+    /// IMU samples after the stamp (the first one at the stamp) until the last row of a rolling shutter and the last
+    /// image of the frame are exposed; empty if no run needs them.
     pub imu_after: &'a [ImuSample],
+    /// Stamps of the images after the frame's on the IMU's clock, in seconds, by camera; empty if all have its stamp. Only
+    /// with [`crate::estimator::EstimatorConfig::frame_camera`].
+    pub image_times_s: &'a [f64],
     /// Samples of the IMU on the gimbal over the interval of `imu`, both ends included and interpolated; empty without
     /// one, or where they are missing.
     pub gimbal_imu: &'a [ImuSample],
-    /// Encoder angles at the stamp with their standard deviations, `None` without encoders.
+    /// Encoder angles at the stamp of the main camera's image with their standard deviations, `None` without encoders.
     pub joint_angles: Option<&'a JointAngles>,
     /// Tracked features of the main camera; empty if it has no image in this frame set.
     pub tracks: &'a TrackedFrame,

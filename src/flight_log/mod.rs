@@ -28,6 +28,7 @@ pub use self::log::topic_info::TopicInfo;
 pub use self::messages::MessageKind;
 pub use self::rig::template as rig_template;
 pub use self::rig::{MissingSensors, RigCandidate, is_imu_file_of, is_rig_name, missing_sensors, rig_candidates};
+pub(crate) use self::stream::image_stamps;
 pub use self::stream::{
     FrameStream, RecordedImage, SensorFrame, SensorSamples, ground_truth_poses, imu_samples, joint_samples,
     nominal_joint_sigma_rad, recorded_images,

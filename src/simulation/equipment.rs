@@ -65,6 +65,7 @@ pub(crate) struct Equipment {
     pub(crate) lens: Lens,
     pub(crate) resolution_px: [usize; 2],
     pub(crate) camera_rate_hz: f64,
+    pub(crate) static_camera_rate_hz: f64,
     pub(crate) camera_time_offset_s: f64,
     pub(crate) readout_s: f64,
     pub(crate) encoder_sigma_rad: Option<f64>,
@@ -79,10 +80,10 @@ impl Equipment {
         let static_extrinsics = CameraMount::Static { imu_from_camera: static_extrinsics(random) };
         let mut cameras = Vec::new();
         let kinds = [
-            (self.gimbal_camera, "gimbal_camera", CameraMount::Gimbal, 0),
-            (self.static_camera, "static_camera", static_extrinsics, 1),
+            (self.gimbal_camera, "gimbal_camera", CameraMount::Gimbal, self.camera_rate_hz),
+            (self.static_camera, "static_camera", static_extrinsics, self.static_camera_rate_hz),
         ];
-        for (wanted, camera, mount, which) in kinds {
+        for (which, (wanted, camera, mount, rate_hz)) in kinds.into_iter().enumerate() {
             if wanted {
                 cameras.push(CameraRig {
                     key: format!("cam{}", cameras.len()),
@@ -90,7 +91,7 @@ impl Equipment {
                     topic: format!("/{camera}/image_raw/compressed"),
                     use_log_time: false,
                     frame_id: camera.to_owned(),
-                    rate_hz: self.camera_rate_hz,
+                    rate_hz,
                     model: camera_model(which, self.lens, self.resolution_px),
                     timeshift_cam_imu_s: self.camera_time_offset_s,
                     readout_s: self.readout_s,

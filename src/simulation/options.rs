@@ -34,6 +34,10 @@ pub struct SimulationOptions {
     pub lens: Lens,
     pub resolution_px: [usize; 2],
     pub camera_rate_hz: f64,
+    /// Rate of the static camera; `None` for the rate of the gimbal camera.
+    pub static_camera_rate_hz: Option<f64>,
+    /// Time of the static camera's images after those of the gimbal camera.
+    pub static_camera_phase_s: f64,
     /// True if the static camera is also recorded.
     pub static_camera: bool,
     /// Standard deviation of the image noise, in grey values.
@@ -64,6 +68,8 @@ impl SimulationOptions {
             lens: Lens::Pinhole,
             resolution_px: [640, 480],
             camera_rate_hz: 20.0,
+            static_camera_rate_hz: None,
+            static_camera_phase_s: 0.0,
             static_camera: true,
             image_noise: 2.0,
             jpeg_quality: 85,
@@ -111,6 +117,10 @@ impl SimulationOptions {
         within("image width", self.resolution_px[0] as f64, 32.0, 4096.0)?;
         within("image height", self.resolution_px[1] as f64, 24.0, 4096.0)?;
         within("camera rate in Hz", self.camera_rate_hz, 0.1, 200.0)?;
+        if let Some(rate_hz) = self.static_camera_rate_hz {
+            within("rate of the static camera in Hz", rate_hz, 0.1, 200.0)?;
+        }
+        within("phase of the static camera in seconds", self.static_camera_phase_s, 0.0, 10.0)?;
         within("image noise in grey values", self.image_noise, 0.0, 100.0)?;
         within("JPEG quality", f64::from(self.jpeg_quality), 1.0, 100.0)?;
         self.disturbances.check()

@@ -29,7 +29,7 @@ use super::world;
 use crate::files::output::OutputSet;
 use crate::flight_log::{LogError, LogWriter, LogWriterOptions, MessageTimes, Odometry};
 use crate::geometry::{during, ns_from_seconds, seconds_from_ns, so3};
-use crate::sensors::{CameraRig, GimbalRig, ImuRig, ImuSample, JointSample, Rig};
+use crate::sensors::{CameraMount, CameraRig, GimbalRig, ImuRig, ImuSample, JointSample, Rig};
 use crate::text::Named as _;
 
 /// Start of simulated logs: 15 June 2025, 15:06:40 UTC.
@@ -219,6 +219,7 @@ fn true_rig(options: &SimulationOptions, name: &str) -> Result<Rig, SimulationEr
         lens: options.lens,
         resolution_px: options.resolution_px,
         camera_rate_hz: options.camera_rate_hz,
+        static_camera_rate_hz: options.static_camera_rate_hz.unwrap_or(options.camera_rate_hz),
         camera_time_offset_s: Planting::of(&options.disturbances).camera_offset_s(),
         readout_s: options.disturbances.readout_s,
         encoder_sigma_rad: options.encoder_sigma_rad,
@@ -355,9 +356,10 @@ fn recordings(options: &SimulationOptions, scenario: &Scenario) -> Recordings {
     let mut shots = Vec::new();
     for (camera, rig) in scenario.true_rig.cameras.iter().enumerate() {
         let period_s = 1.0 / rig.rate_hz;
+        let phase_s = if rig.mount == CameraMount::Gimbal { 0.0 } else { options.static_camera_phase_s };
         let mut frame_index = 0;
         loop {
-            let stamp_s = FIRST_IMAGE_S + frame_index as f64 * period_s;
+            let stamp_s = FIRST_IMAGE_S + phase_s + frame_index as f64 * period_s;
             if stamp_s.max(stamp_s + shift_s + rows_s[1]) > duration_s {
                 break;
             }

@@ -48,6 +48,8 @@ pub struct SyntheticOptions {
     pub seed: u64,
     pub duration_s: f64,
     pub frame_rate_hz: f64,
+    /// Time by which all images are later.
+    pub phase_s: f64,
     /// Noise of a feature's pixel, per axis.
     pub pixel_sigma_px: f64,
     /// Ratio of features whose tracks drift away from their landmark.
@@ -89,6 +91,7 @@ impl Default for SyntheticOptions {
             seed: 1,
             duration_s: 20.0,
             frame_rate_hz: 20.0,
+            phase_s: 0.0,
             pixel_sigma_px: 0.3,
             outlier_ratio: 0.0,
             features: 150,
@@ -176,6 +179,7 @@ pub fn synthetic_tracks(options: &SyntheticOptions) -> SyntheticFlight {
         lens: options.lens,
         resolution_px: [640, 480],
         camera_rate_hz: options.frame_rate_hz,
+        static_camera_rate_hz: options.frame_rate_hz,
         camera_time_offset_s: 0.0,
         readout_s: options.readout_s,
         encoder_sigma_rad: options.encoder_sigma_rad,
@@ -209,11 +213,12 @@ pub fn synthetic_tracks(options: &SyntheticOptions) -> SyntheticFlight {
     let camera = &scenario.true_rig.cameras[0];
     let mut encoders = RandomStream::new(options.seed, stream::ENCODERS);
     let mut tracker = Tracker::new(camera.model.clone(), scenario.given_rig.cameras[0].model.clone(), options);
-    let count = ((options.duration_s - FIRST_FRAME_S) * options.frame_rate_hz).floor().max(0.0) as usize + 1;
+    let first_s = FIRST_FRAME_S + options.phase_s;
+    let count = ((options.duration_s - first_s) * options.frame_rate_hz).floor().max(0.0) as usize + 1;
     let mut frames = Vec::with_capacity(count);
     let mut previous_ns = 0;
     for index in 0..count {
-        let time_s = FIRST_FRAME_S + index as f64 / options.frame_rate_hz;
+        let time_s = first_s + index as f64 / options.frame_rate_hz;
         let stamp_ns = ns_from_seconds(time_s);
         let ground_truth = scenario.trajectory.at(time_s);
         let [camera_offset_s, encoder_offset_s] = options.clock_offsets_s;

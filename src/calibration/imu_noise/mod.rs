@@ -197,6 +197,7 @@ fn measure(
             stamp_ns: view.stamp_ns,
             imu: &view.imu,
             imu_after: &[],
+            image_times_s: &[],
             gimbal_imu: &[],
             joint_angles: view.joint_angles.as_ref(),
             tracks: &view.tracks,

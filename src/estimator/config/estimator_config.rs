@@ -52,6 +52,9 @@ pub struct EstimatorConfig {
     pub timeshift_s: f64,
     /// Rigid cameras in addition to the main one.
     pub rigid_cameras: Vec<RigidCamera>,
+    /// Camera at whose images the frames lie, the main one first, where images of other cameras are exposed between them;
+    /// `None` if all images of a step have one stamp.
+    pub frame_camera: Option<usize>,
     /// Calibrations of earlier flights: initial values and prior of the calibration, which replace the given chains.
     pub calibration_prior: Option<Arc<CalibrationPrior>>,
     /// Result of an earlier pass over the same measurements: initial values and prior of the calibration, which replace
@@ -176,6 +179,7 @@ impl EstimatorConfig {
             sensor: CameraSensorPrior::of_rig(camera),
             timeshift_s: camera.timeshift_cam_imu_s,
             rigid_cameras: Vec::new(),
+            frame_camera: None,
             calibration_prior: None,
             earlier_pass: None,
             options: EstimatorOptions::default(),

@@ -10,7 +10,7 @@
 
 use std::borrow::Cow;
 
-use nalgebra::{DMatrix, Matrix3, Matrix3xX, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Vector3};
 
 use crate::estimator::state::calibration::Calibration;
 use crate::estimator::state::camera_pose::{self, CameraMaps};
@@ -40,11 +40,10 @@ pub(crate) fn motion_parts(
     let mut parts = vec![DMatrix::zeros(6 * maps.blocks(), columns); 6 + joints];
     let sensor = calibration.sensor_model();
     let rows = sensor.block_rows();
-    // States at the exposures of the blocks.
-    let frames: Vec<Cow<'_, FrameState>> = stamped
-        .iter()
-        .flat_map(|state| rows.iter().map(|row| camera_pose::state_at_exposure(state, sensor.row_time_s(*row))))
-        .collect();
+    let exposures = stamped.iter().flat_map(|state| rows.iter().map(move |row| (state, *row)));
+    let exposures: Vec<_> = exposures.map(|(state, row)| (state, sensor.exposure(state, row))).collect();
+    let frames: Vec<Cow<'_, FrameState>> =
+        exposures.iter().map(|(state, exposure)| camera_pose::state_at(state, exposure)).collect();
     let Some(newest) = frames.last() else { return parts };
     let there = twists(calibration, &newest.joints_rad);
     for (block, frame) in frames.iter().enumerate() {
@@ -59,11 +58,14 @@ pub(crate) fn motion_parts(
         body_parts(&to_newest, &there, &mut put);
         joint_parts(calibration, &newest.joints_rad, &frame.joints_rad, &mut put);
     }
+    let attitude = |frame: &Cow<'_, FrameState>| frame.navigation.world_from_imu.rotation_matrix();
+    let motions = exposures.iter().map(|(state, exposure)| state.motion_at(exposure));
+    let moving: Vec<(Matrix3<f64>, DVector<f64>)> = frames.iter().map(attitude).zip(motions).collect();
     if let Some(column) = sensor.shift_column {
-        clock_parts(&frames, maps, column, &[1.0], &mut parts);
+        clock_parts(&moving, maps, column, &[1.0], &mut parts);
     }
     if let Some(column) = sensor.readout_column {
-        clock_parts(&frames, maps, column, rows, &mut parts);
+        clock_parts(&moving, maps, column, rows, &mut parts);
     }
     parts
 }
@@ -116,17 +118,16 @@ fn joint_parts(calibration: &Calibration, from_rad: &[f64], to_rad: &[f64], put:
 }
 
 /// Contributions to a time offset or readout time, which moves the camera of a row by its velocity times the row's
-/// factor.
+/// factor; `moving` are the attitude of the IMU and the motion at each block.
 fn clock_parts(
-    frames: &[Cow<'_, FrameState>],
+    moving: &[(Matrix3<f64>, DVector<f64>)],
     maps: &CameraMaps,
     clock: usize,
     factors: &[f64],
     parts: &mut [DMatrix<f64>],
 ) {
-    for ((block, frame), factor) in frames.iter().enumerate().zip(factors.iter().cycle()) {
-        let (own, rates) = (&maps.own[block], frame.motion());
-        let body_from_world = frame.navigation.world_from_imu.rotation_matrix().transpose();
+    for ((block, (world_from_imu, rates)), factor) in moving.iter().enumerate().zip(factors.iter().cycle()) {
+        let (own, body_from_world) = (&maps.own[block], world_from_imu.transpose());
         let velocity = body_from_world * rates.fixed_rows::<3>(3);
         for (motion, part) in parts.iter_mut().enumerate() {
             let moved = match motion {

@@ -191,6 +191,7 @@ impl JacobianSource {
                     gyroscope_rad_per_s: three(0),
                     joints_rad_per_s: rates.get(POSE..).unwrap_or_default().to_vec(),
                     profile: None,
+                    image_times_s: Vec::new(),
                 }),
             }
         });

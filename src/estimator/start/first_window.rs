@@ -80,8 +80,9 @@ impl<'a> FirstWindow<'a> {
             };
             let joints_rad = waiting.initial_joints_rad(joints);
             let joint_motion = setup.initial_joint_motion(waiting.encoder.as_ref(), joints_rad.len());
-            let profile = setup.motion_profile(&waiting.imu, &waiting.imu_after, solution.bias);
-            let rates = Rates::at(&waiting.imu, waiting.encoder.as_ref(), profile);
+            let samples = [waiting.imu.as_slice(), &waiting.imu_after];
+            let profile = setup.motion_profile(samples, &waiting.image_times_s, solution.bias);
+            let rates = Rates::at(&waiting.imu, waiting.encoder.as_ref(), profile, &waiting.image_times_s);
             let own = setup.initial_gimbal_imu(navigation.velocity_m_per_s);
             let gimbal_motion = frames.as_ref().and_then(|frames: &Frames| {
                 let interval_ns = waiting.stamp_ns - frames.newest().stamp_ns;
@@ -208,6 +209,8 @@ pub(super) struct WaitingFrame {
     pub(super) imu: Vec<ImuSample>,
     /// IMU samples from the stamp on.
     pub(super) imu_after: Vec<ImuSample>,
+    /// Stamps of the images after the frame's, as in [`StepInput`].
+    pub(super) image_times_s: Vec<f64>,
     /// Samples of the IMU on the gimbal over the interval of `imu`.
     pub(super) gimbal_imu: Vec<ImuSample>,
 }
@@ -225,6 +228,7 @@ impl WaitingFrame {
         size_of::<Self>()
             + features
             + encoder
+            + self.image_times_s.capacity() * size_of::<f64>()
             + (self.imu.capacity() + self.imu_after.capacity() + self.gimbal_imu.capacity()) * size_of::<ImuSample>()
     }
 }

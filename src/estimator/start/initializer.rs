@@ -134,6 +134,7 @@ impl Initializer {
             encoder,
             imu: input.imu.to_vec(),
             imu_after: if setup.has_moving_rows() { input.imu_after.to_vec() } else { Vec::new() },
+            image_times_s: input.image_times_s.to_vec(),
             gimbal_imu: if setup.config.gimbal_imu.is_some() { input.gimbal_imu.to_vec() } else { Vec::new() },
         });
         let longest_ns = (self.options(setup).longest_window_s * 1e9) as i64;

@@ -8,6 +8,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::calibration_posterior::CameraPosterior;
+use super::calibrations::MAIN;
 use super::earlier_pass::FoundCamera;
 use super::given_chain::{EarlierPrior, GivenChain, GivenSigmas, PriorMeasurements};
 use super::sensor_columns::SensorColumn;
@@ -52,6 +53,10 @@ impl Values {
 pub(crate) struct Calibration {
     values: Values,
     given: Arc<GivenChain>,
+    /// Index among the cameras of the run.
+    camera: usize,
+    /// True if frames lie at the images of this camera and images of other cameras between them.
+    has_frames: bool,
     /// Columns after the chain's, as parameters of the main camera.
     sensors: Arc<[SensorColumn]>,
     /// Readout time of the rig, in seconds.
@@ -78,6 +83,8 @@ impl Calibration {
         Self {
             values,
             given: Arc::new(given),
+            camera: MAIN,
+            has_frames: false,
             sensors: Arc::default(),
             given_readout_s: 0.0,
             given_gimbal_imu: None,
@@ -85,6 +92,24 @@ impl Calibration {
             free,
             frozen: Vec::new(),
         }
+    }
+
+    /// This calibration as the one of another camera of the run.
+    pub(crate) fn of_camera(self, camera: usize) -> Self {
+        Self { camera, ..self }
+    }
+
+    pub(crate) fn camera(&self) -> usize {
+        self.camera
+    }
+
+    /// This calibration as the one of the camera at whose images frames lie, or of another one.
+    pub(crate) fn with_frames(self, has_frames: bool) -> Self {
+        Self { has_frames, ..self }
+    }
+
+    pub(crate) fn has_frames(&self) -> bool {
+        self.has_frames
     }
 
     /// Adds columns for time offsets, shutter and intrinsics, unless the calibration is fixed.

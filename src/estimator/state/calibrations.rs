@@ -23,7 +23,15 @@ pub(crate) struct Calibrations {
 
 impl Calibrations {
     pub(crate) fn new(main: Calibration, rigid: impl IntoIterator<Item = Calibration>) -> Self {
-        Self { cameras: std::iter::once(main).chain(rigid).collect(), imu: None }
+        let cameras = std::iter::once(main).chain(rigid).enumerate();
+        Self { cameras: cameras.map(|(index, one)| one.of_camera(index)).collect(), imu: None }
+    }
+
+    /// These calibrations with the frames at the images of one camera; `None` if all images of a frame have one stamp.
+    pub(crate) fn with_frame_camera(self, frame_camera: Option<usize>) -> Self {
+        let cameras = self.cameras.into_iter().enumerate();
+        let cameras = cameras.map(|(index, one)| one.with_frames(frame_camera == Some(index)));
+        Self { cameras: cameras.collect(), ..self }
     }
 
     pub(crate) fn with_imu(self, imu: Option<ImuCalibration>) -> Self {
@@ -115,9 +123,11 @@ impl Calibrations {
         &mut self.cameras[camera]
     }
 
-    /// Camera that starts the window: a rigid one if there is one, since its extrinsics are most accurate.
+    /// Camera that starts the window: the one at whose images frames lie, else a rigid one if there is one, since its
+    /// extrinsics are most accurate.
     pub(crate) fn leading(&self) -> usize {
-        self.cameras.iter().position(|calibration| calibration.joint_count() == 0).unwrap_or(MAIN)
+        let rigid = || self.cameras.iter().position(|calibration| calibration.joint_count() == 0);
+        self.cameras.iter().position(Calibration::has_frames).or_else(rigid).unwrap_or(MAIN)
     }
 
     /// True if the leading camera's chain has [inaccurate rotations](Calibration::has_inaccurate_rotations).

@@ -6,7 +6,7 @@ use std::ops::Range;
 use nalgebra::{DMatrix, Matrix3, Matrix6, Matrix6x3, Matrix6xX, Vector3};
 
 use super::calibration::Calibration;
-use super::frame_state::FrameState;
+use super::frame_state::{Exposure, FrameState};
 use super::layout::{Layout, POSE, ROW_MOTION};
 use crate::geometry::so3;
 use crate::gimbal::{Chain, ChainLinearization};
@@ -19,6 +19,8 @@ pub(crate) const ROLLING_ROWS: [f64; 3] = [0.0, 0.5, 1.0];
 #[derive(Clone, Debug)]
 pub(crate) struct CameraCalibration<'a> {
     pub(crate) chain: Cow<'a, Chain>,
+    /// Index among the cameras of the run.
+    pub(crate) camera: usize,
     /// Number of calibration columns: chain, then time offset, shutter and intrinsics; zero when fixed.
     pub(crate) columns: usize,
     /// Time offset in seconds: exposure time of the first row minus stamp.
@@ -49,9 +51,10 @@ impl CameraCalibration<'_> {
         linearization
     }
 
-    /// Time of a row after the stamp, in seconds; `row` is 0 for the first one and 1 for the end of the last one.
-    pub(crate) fn row_time_s(&self, row: f64) -> f64 {
-        if self.rolling { self.shift_s + row * self.readout_s } else { self.shift_s }
+    /// Exposure of a row in a frame; `row` is 0 for the first one and 1 for the end of the last one.
+    pub(crate) fn exposure(&self, state: &FrameState, row: f64) -> Exposure {
+        let after_image_s = if self.rolling { self.shift_s + row * self.readout_s } else { self.shift_s };
+        state.rates.exposure(self.camera, after_image_s)
     }
 
     /// Rows with a separate block of derivatives.
@@ -66,6 +69,7 @@ impl Calibration {
         let free = self.dof() > 0;
         CameraCalibration {
             chain: Cow::Borrowed(self.chain()),
+            camera: self.camera(),
             columns: self.dof(),
             shift_s: self.camera_shift_s(),
             shift_column: self.camera_shift_column(),
@@ -85,14 +89,14 @@ pub(crate) fn at(state: &FrameState, calibration: &Calibration) -> CameraPose {
 
 /// `world_from_camera` at a state and the exposure of a row: 0 for the first row, 1 for the end of the last one.
 pub(crate) fn at_row(state: &FrameState, sensor: &CameraCalibration<'_>, row: f64) -> CameraPose {
-    let state = &*state_at_exposure(state, sensor.row_time_s(row));
+    let state = &*state_at(state, &sensor.exposure(state, row));
     let pose = state.navigation.world_from_imu * sensor.chain.imu_from_camera(sensor.own(&state.joints_rad));
     CameraPose { rotation: pose.rotation_matrix(), position_m: pose.translation_m }
 }
 
-/// State at the exposure, extrapolated by `shift_s` from the stamp.
-pub(crate) fn state_at_exposure(state: &FrameState, shift_s: f64) -> Cow<'_, FrameState> {
-    if shift_s == 0.0 { Cow::Borrowed(state) } else { Cow::Owned(state.later(shift_s)) }
+/// State at an exposure.
+pub(crate) fn state_at<'a>(state: &'a FrameState, exposure: &Exposure) -> Cow<'a, FrameState> {
+    if *exposure == Exposure::NONE { Cow::Borrowed(state) } else { Cow::Owned(state.at(exposure)) }
 }
 
 /// Derivatives of the blocks of a camera with respect to the unknowns: `[φ; δt]` of `world_from_camera` by frame (with
@@ -220,22 +224,22 @@ fn add_transposed_product(
 
 /// Derivatives of the camera pose at a row with respect to the unknowns of its frame and to the calibration.
 fn block_map(stamped: &FrameState, sensor: &CameraCalibration<'_>, row: f64) -> (DMatrix<f64>, DMatrix<f64>) {
-    let time_s = sensor.row_time_s(row);
-    let state = &*state_at_exposure(stamped, time_s);
+    let exposure = sensor.exposure(stamped, row);
+    let state = &*state_at(stamped, &exposure);
     let chain = sensor.linearize(&state.joints_rad);
     let world_from_imu = state.navigation.world_from_imu.rotation_matrix();
     let (mut own, mut by_calibration) = camera_map(&world_from_imu, state.joints_rad.len(), &chain);
     for (column, factor) in [(sensor.shift_column, 1.0), (sensor.readout_column, row)] {
         if let Some(column) = column.filter(|_| factor != 0.0) {
-            by_calibration.set_column(column, &(&own * stamped.motion_at(time_s) * factor));
+            by_calibration.set_column(column, &(&own * stamped.motion_at(&exposure) * factor));
         }
     }
-    if time_s != 0.0 {
+    if exposure != Exposure::NONE {
         // The unknown is the attitude at the stamp.
         let at_stamp = stamped.navigation.world_from_imu.rotation_matrix();
         let by_attitude: Matrix6x3<f64> = own.fixed_view::<6, 3>(0, 0) * world_from_imu.tr_mul(&at_stamp);
         if stamped.has_moving_rows() {
-            own = moving_map(stamped, &own, &by_attitude, time_s);
+            own = moving_map(stamped, &own, &by_attitude, &exposure);
         } else {
             own.fixed_columns_mut::<3>(0).copy_from(&by_attitude);
         }
@@ -246,10 +250,16 @@ fn block_map(stamped: &FrameState, sensor: &CameraCalibration<'_>, row: f64) -> 
     (own, by_calibration)
 }
 
-/// Converts derivatives by pose and joints at `time_s` after the stamp to derivatives by the state at the stamp
-/// (6 × columns): `[φ, p, joints, joint rates and accelerations, v, b_g]`.
+/// Converts derivatives by pose and joints at an exposure to derivatives by the unknowns of the frame (6 × columns):
+/// `[φ, p, joints, joint rates and accelerations, v, b_g]`.
 /// `by_rotation` has the derivatives by the attitude at the stamp at fixed position.
-fn moving_map(stamped: &FrameState, own: &DMatrix<f64>, by_rotation: &Matrix6x3<f64>, time_s: f64) -> DMatrix<f64> {
+fn moving_map(
+    stamped: &FrameState,
+    own: &DMatrix<f64>,
+    by_rotation: &Matrix6x3<f64>,
+    exposure: &Exposure,
+) -> DMatrix<f64> {
+    let Exposure { after_stamp_s: time_s, after_joints_s } = *exposure;
     let (joints, motion) = (stamped.joints_rad.len(), stamped.joint_motion.len());
     let mut map = DMatrix::zeros(6, POSE + joints + motion + ROW_MOTION);
     map.columns_mut(0, POSE + joints).copy_from(own);
@@ -259,7 +269,9 @@ fn moving_map(stamped: &FrameState, own: &DMatrix<f64>, by_rotation: &Matrix6x3<
     let by_attitude = by_rotation - by_position * at_stamp * so3::hat(&moved);
     map.fixed_columns_mut::<3>(0).copy_from(&by_attitude);
     // Joint rates, then joint accelerations.
-    for (part, factor) in [time_s, 0.5 * time_s * time_s].into_iter().enumerate().take(motion / joints.max(1)) {
+    for (part, factor) in
+        [after_joints_s, 0.5 * after_joints_s * after_joints_s].into_iter().enumerate().take(motion / joints.max(1))
+    {
         let by_part = own.columns(POSE, joints) * factor;
         map.columns_mut(POSE + joints * (1 + part), joints).copy_from(&by_part);
     }

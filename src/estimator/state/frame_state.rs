@@ -5,6 +5,7 @@ use std::sync::Arc;
 use nalgebra::{DVector, Vector3};
 
 use super::allocation::allocated_bytes;
+use super::calibrations::MAIN;
 use super::layout::{POSE, VELOCITY_BIAS};
 use super::motion_profile::{MotionProfile, RowMotion};
 use super::navigation::GimbalImuState;
@@ -16,7 +17,8 @@ use crate::sensors::{ImuSample, JointAngles};
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct FrameState {
     pub(crate) navigation: NavigationState,
-    /// Joint angles without the static offsets, in radians.
+    /// Joint angles without the static offsets, in radians, at the stamp of the main camera's image (at the frame's stamp
+    /// without one).
     pub(crate) joints_rad: Vec<f64>,
     /// Joint rates in rad/s, then joint accelerations in rad/s²; empty unless rows of the image depend on them.
     pub(crate) joint_motion: Vec<f64>,
@@ -33,13 +35,34 @@ pub(crate) struct Rates {
     pub(crate) gyroscope_rad_per_s: Vector3<f64>,
     /// Joint rates measured by the encoders, in rad/s; empty without readings.
     pub(crate) joints_rad_per_s: Vec<f64>,
-    /// Motion of the vehicle after the stamp, `None` unless rows of the image depend on it.
+    /// Motion of the vehicle near the stamp, `None` unless images depend on it.
     pub(crate) profile: Option<MotionProfile>,
+    /// Times of the images after the stamp in seconds, by camera; empty if all are at the stamp.
+    pub(crate) image_times_s: Vec<f64>,
+}
+
+/// Time of an exposure, in seconds after the times to which the unknowns of a frame refer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Exposure {
+    /// After the stamp, to which pose and velocity of the vehicle refer.
+    pub(crate) after_stamp_s: f64,
+    /// After the stamp of the main camera's image, to which the joint angles refer.
+    pub(crate) after_joints_s: f64,
+}
+
+impl Exposure {
+    /// At the times of the unknowns.
+    pub(crate) const NONE: Self = Self { after_stamp_s: 0.0, after_joints_s: 0.0 };
 }
 
 impl Rates {
-    /// Rates at the last of `imu`, which has the stamp of the frame.
-    pub(crate) fn at(imu: &[ImuSample], encoder: Option<&JointAngles>, profile: Option<MotionProfile>) -> Arc<Self> {
+    /// Rates at the last of `imu`, which has the stamp of the frame; the times of the images are by camera.
+    pub(crate) fn at(
+        imu: &[ImuSample],
+        encoder: Option<&JointAngles>,
+        profile: Option<MotionProfile>,
+        image_times_s: &[f64],
+    ) -> Arc<Self> {
         let gyroscope_rad_per_s = imu.last().map_or_else(Vector3::zeros, |sample| sample.angular_velocity_rad_per_s);
         let finite = gyroscope_rad_per_s.iter().all(|rate| rate.is_finite());
         let joints = encoder.map_or_else(Vec::new, |encoder| encoder.rates_rad_per_s.clone());
@@ -47,7 +70,15 @@ impl Rates {
             gyroscope_rad_per_s: if finite { gyroscope_rad_per_s } else { Vector3::zeros() },
             joints_rad_per_s: if joints.iter().all(|rate| rate.is_finite()) { joints } else { Vec::new() },
             profile,
+            image_times_s: image_times_s.to_vec(),
         })
+    }
+
+    /// Exposure of a camera, `seconds` after the stamp of its image.
+    pub(crate) fn exposure(&self, camera: usize, seconds: f64) -> Exposure {
+        let image_s = |camera: usize| self.image_times_s.get(camera).copied().unwrap_or(0.0);
+        let after_stamp_s = image_s(camera) + seconds;
+        Exposure { after_stamp_s, after_joints_s: if camera == MAIN { seconds } else { after_stamp_s - image_s(MAIN) } }
     }
 
     /// Memory use in bytes, heap included.
@@ -55,6 +86,7 @@ impl Rates {
         allocated_bytes(size_of::<Self>())
             + allocated_bytes(self.joints_rad_per_s.capacity() * size_of::<f64>())
             + self.profile.as_ref().map_or(0, MotionProfile::heap_bytes)
+            + allocated_bytes(self.image_times_s.capacity() * size_of::<f64>())
     }
 
     /// Rate of one joint, in rad/s; zero without a measurement.
@@ -64,8 +96,9 @@ impl Rates {
 }
 
 impl FrameState {
-    /// Extrapolates the state by a time: along the measured motion if there is one, else at constant rates.
-    pub(crate) fn later(&self, seconds: f64) -> Self {
+    /// State at an exposure: along the measured motion if there is one, else at constant rates.
+    pub(crate) fn at(&self, exposure: &Exposure) -> Self {
+        let Exposure { after_stamp_s: seconds, after_joints_s } = *exposure;
         let mut later = self.clone();
         let pose = &mut later.navigation.world_from_imu;
         if let Some((motion, gravity)) = self.row_motion(seconds) {
@@ -80,9 +113,9 @@ impl FrameState {
             pose.translation_m += self.navigation.velocity_m_per_s * seconds;
         }
         for (joint, angle) in later.joints_rad.iter_mut().enumerate() {
-            *angle += self.joint_rate_rad_per_s(joint) * seconds;
+            *angle += self.joint_rate_rad_per_s(joint) * after_joints_s;
             if let Some(acceleration) = self.joint_acceleration_rad_per_s2(joint) {
-                *angle += acceleration * (0.5 * seconds * seconds);
+                *angle += acceleration * (0.5 * after_joints_s * after_joints_s);
             }
         }
         later
@@ -110,12 +143,12 @@ impl FrameState {
         self.joint_motion.get(self.joints_rad.len() + joint).copied()
     }
 
-    /// Time derivative of pose and joints of [`Self::later`] at a time since the stamp:
-    /// `[angular velocity; velocity; joint rates]`.
-    pub(crate) fn motion_at(&self, seconds: f64) -> DVector<f64> {
+    /// Time derivative of pose and joints of [`Self::at`]: `[angular velocity; velocity; joint rates]`.
+    pub(crate) fn motion_at(&self, exposure: &Exposure) -> DVector<f64> {
+        let Exposure { after_stamp_s: seconds, after_joints_s } = *exposure;
         let joints = (0..self.joints_rad.len()).map(|joint| {
             let acceleration = self.joint_acceleration_rad_per_s2(joint).unwrap_or(0.0);
-            self.joint_rate_rad_per_s(joint) + acceleration * seconds
+            self.joint_rate_rad_per_s(joint) + acceleration * after_joints_s
         });
         let (angular_velocity, velocity) = match self.row_motion(seconds) {
             Some((motion, gravity)) => (
@@ -130,9 +163,9 @@ impl FrameState {
         DVector::from_vec(all)
     }
 
-    /// Motion of the frame without a time offset, [`Self::motion_at`] zero.
+    /// Motion at the times of the unknowns, as [`Self::motion_at`] returns it.
     pub(crate) fn motion(&self) -> DVector<f64> {
-        self.motion_at(0.0)
+        self.motion_at(&Exposure::NONE)
     }
 
     /// Bytes on the heap, without the rates, which the states of a frame share.

@@ -1,4 +1,4 @@
-//! Motion of the vehicle after a stamp, while the rows of a rolling shutter are exposed.
+//! Motion of the vehicle near a stamp, while the rows of a rolling shutter or images of other cameras are exposed.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -7,7 +7,10 @@ use super::preintegration::Preintegration;
 use crate::geometry::{seconds_from_ns, so3};
 use crate::sensors::{ImuNoise, ImuSample};
 
-/// Motion of the IMU after a stamp, integrated from its samples without gravity and initial velocity.
+/// Time before the first image of a frame that a profile covers, in seconds: time offsets change during the estimation.
+const MARGIN_S: f64 = 0.01;
+
+/// Motion of the IMU near a stamp, integrated from its samples without gravity and initial velocity.
 ///
 /// It depends only on the samples, not on the state at the stamp, which adds pose, velocity and gyroscope bias.
 #[derive(Clone, Debug, PartialEq)]
@@ -16,15 +19,14 @@ pub(crate) struct MotionProfile {
     pub(crate) bias: ImuBias,
     /// Gravity in the world, in m/s².
     pub(crate) gravity_in_world: Vector3<f64>,
-    /// Motion at the stamp and at the samples after it, in ascending order; the first knot is at time zero, without
-    /// motion.
+    /// Motion at the stamp and at samples before and after it, in ascending order; the knot at time zero has no motion.
     pub(crate) knots: Vec<ProfileKnot>,
 }
 
 /// Motion from the stamp to one sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ProfileKnot {
-    /// Time since the stamp, in seconds.
+    /// Time since the stamp, in seconds; negative before it.
     pub(crate) time_s: f64,
     /// Rotation from the IMU at that time to the IMU at the stamp.
     pub(crate) rotation: UnitQuaternion<f64>,
@@ -76,6 +78,45 @@ impl MotionProfile {
             });
         }
         (!knots.is_empty()).then_some(Self { bias, gravity_in_world, knots })
+    }
+
+    /// This profile with the motion from a time before the stamp on, in seconds after it, by samples of which the last one is
+    /// at the stamp.
+    ///
+    /// In reversed time the angular velocity changes its sign and the specific force does not: the integral over the
+    /// reversed samples has the rotations and positions of the motion, and its negative velocities.
+    pub(crate) fn with_motion_before(mut self, samples: &[ImuSample], earliest_s: f64) -> Self {
+        let Some((last, earlier)) = samples.split_last().filter(|_| earliest_s < 0.0) else { return self };
+        let reversed = |sample: &ImuSample| ImuSample {
+            stamp_ns: last.stamp_ns - sample.stamp_ns,
+            angular_velocity_rad_per_s: -sample.angular_velocity_rad_per_s,
+            specific_force_m_per_s2: sample.specific_force_m_per_s2,
+        };
+        let bias = ImuBias { gyroscope_rad_per_s: -self.bias.gyroscope_rad_per_s, ..self.bias };
+        let mut motion = Preintegration::new(ImuNoise::ZERO, bias);
+        motion.extend(&[reversed(last)]);
+        for sample in earlier.iter().rev() {
+            let before = motion.samples().len();
+            motion.extend(&[reversed(sample)]);
+            if motion.samples().len() == before {
+                continue;
+            }
+            let increment = motion.increment();
+            let time_s = seconds_from_ns(sample.stamp_ns - last.stamp_ns);
+            self.knots.push(ProfileKnot {
+                time_s,
+                rotation: increment.rotation,
+                velocity_m_per_s: -increment.velocity_m_per_s,
+                position_m: increment.position_m,
+                rate_rad_per_s: sample.angular_velocity_rad_per_s,
+                force_m_per_s2: sample.specific_force_m_per_s2 - self.bias.accelerometer_m_per_s2,
+            });
+            if time_s < earliest_s - MARGIN_S {
+                break;
+            }
+        }
+        self.knots.sort_by(|one, other| one.time_s.total_cmp(&other.time_s));
+        self
     }
 
     /// Profile of a stationary vehicle, without samples.

@@ -25,7 +25,7 @@ use crate::estimator::window::setup::Setup;
 use crate::estimator::window::window_state::WindowState;
 use crate::estimator::{DEFAULT_CHAIN_PRIOR, Estimator, StepInput};
 use crate::frontend::TrackedFrame;
-use crate::geometry::Dimension;
+use crate::geometry::{Dimension, seconds_from_ns};
 use crate::gimbal::{Chain, ParameterId, Parameterization};
 use crate::sensors::{ImuSample, Rig};
 use crate::simulation::{
@@ -125,6 +125,7 @@ pub(super) fn step_before(
         stamp_ns: frame.stamp_ns,
         imu: &frame.imu,
         imu_after: next.map_or(&[], |next| &next.imu),
+        image_times_s: &[],
         gimbal_imu: &frame.gimbal_imu,
         joint_angles: joint_angles.as_ref(),
         tracks,
@@ -156,6 +157,22 @@ pub(super) fn cluster_window(options: EstimatorOptions, estimate_timeshift: bool
     assert_eq!(main.frames[7].imu, rigid.frames[7].imu, "one flight");
     let config = EstimatorConfig {
         rigid_cameras: vec![rigid_camera(&rigid)],
+        estimate_timeshift,
+        ..config(&main.given_rig, Parameterization::Minimal, options)
+    };
+    window_of(&main, Some(&rigid), config)
+}
+
+/// Time of the gimballed camera's images after the rigid one's in [`interleaved_window`].
+const INTERLEAVED_S: f64 = -0.02;
+
+/// [`cluster_window`] with the frames at the images of the rigid camera, and with images of the gimballed one between them.
+pub(super) fn interleaved_window(options: EstimatorOptions, estimate_timeshift: bool) -> TestWindow {
+    let main = synthetic_tracks(&SyntheticOptions { phase_s: INTERLEAVED_S, ..flight_options(true) });
+    let rigid = flight(false);
+    let config = EstimatorConfig {
+        rigid_cameras: vec![rigid_camera(&rigid)],
+        frame_camera: Some(1),
         estimate_timeshift,
         ..config(&main.given_rig, Parameterization::Minimal, options)
     };
@@ -195,34 +212,41 @@ fn window_of(flight: &SyntheticFlight, rigid: Option<&SyntheticFlight>, config: 
     }
     let mut features = vec![FeatureMap::new(); calibration.cameras()];
     let mut frames: Option<Frames> = None;
+    // The window's frames lie at the images of this flight.
+    let frame_flight = rigid.filter(|_| setup.config.frame_camera == Some(1)).unwrap_or(flight);
     let spacing = 4;
     let first = 100;
     for slot in 0..6 {
         let index = first + slot * spacing;
-        let ground_truth = &flight.frames[index];
-        let encoder = setup.config.encoder_sigma_rad.and_then(|sigma_rad| ground_truth.encoder_angles(sigma_rad));
+        let (ground_truth, main) = (&frame_flight.frames[index], &flight.frames[index]);
+        let image_times_s = match setup.config.frame_camera {
+            Some(_) => vec![seconds_from_ns(main.stamp_ns - ground_truth.stamp_ns), 0.0],
+            None => Vec::new(),
+        };
+        let encoder = setup.config.encoder_sigma_rad.and_then(|sigma_rad| main.encoder_angles(sigma_rad));
         let bias = ImuBias {
             gyroscope_rad_per_s: ground_truth.true_bias.gyroscope_rad_per_s,
             accelerometer_m_per_s2: ground_truth.true_bias.accelerometer_m_per_s2,
         };
         let mut motion = Preintegration::new(setup.imu_noise, bias);
         if slot > 0 {
-            for frame in &flight.frames[index - spacing + 1..=index] {
+            for frame in &frame_flight.frames[index - spacing + 1..=index] {
                 motion.extend(&frame.imu);
             }
         }
-        let profile = setup.motion_profile(&ground_truth.imu, &flight.frames[index + 1].imu, bias);
-        let joint_motion = setup.initial_joint_motion(encoder.as_ref(), ground_truth.true_joint_angles_rad.len());
+        let profile =
+            setup.motion_profile([&ground_truth.imu, &frame_flight.frames[index + 1].imu], &image_times_s, bias);
+        let joint_motion = setup.initial_joint_motion(encoder.as_ref(), main.true_joint_angles_rad.len());
         let state = FrameState {
             navigation: NavigationState {
                 world_from_imu: ground_truth.true_world_from_imu,
                 velocity_m_per_s: ground_truth.true_velocity_m_per_s,
                 bias,
             },
-            joints_rad: ground_truth.true_joint_angles_rad.clone(),
+            joints_rad: main.true_joint_angles_rad.clone(),
             joint_motion,
             gimbal_imu: setup.initial_gimbal_imu(ground_truth.true_velocity_m_per_s),
-            rates: Rates::at(&ground_truth.imu, encoder.as_ref(), profile),
+            rates: Rates::at(&ground_truth.imu, encoder.as_ref(), profile, &image_times_s),
         };
         let between = &flight.frames[index - spacing + 1..=index];
         let samples: Vec<ImuSample> = between.iter().flat_map(|frame| &frame.gimbal_imu).copied().collect();
@@ -237,7 +261,7 @@ fn window_of(flight: &SyntheticFlight, rigid: Option<&SyntheticFlight>, config: 
             None => frames = Some(Frames::new(frame)),
             Some(frames) => frames.push(frame),
         }
-        features::observe(&mut features[MAIN], slot, &ground_truth.tracks.features);
+        features::observe(&mut features[MAIN], slot, &main.tracks.features);
         if let Some(rigid) = rigid {
             features::observe(&mut features[1], slot, &rigid.frames[index].tracks.features);
         }

@@ -30,6 +30,7 @@ fn windows() -> Vec<(&'static str, TestWindow)> {
         ("rigid", fixture::window(Parameterization::Minimal, false, options)),
         ("cluster", fixture::cluster_window(options, false)),
         ("cluster with clocks", fixture::cluster_window(options, true)),
+        ("interleaved", fixture::interleaved_window(options, true)),
     ];
     let mut frozen = gimbal(Parameterization::Classical);
     for name in ["EC.tx", "L1.d"] {
@@ -63,7 +64,9 @@ fn the_terms_of_the_motions_sum_to_the_calibration_jacobian() {
             let projected = problem.projected_rows(camera, &estimate, &linearized, NewestRows::Among);
             let by_camera = projected.rows.columns(0, 6 * frames.len());
             let (left, all) = (by_camera * (&whole - sum), by_camera * whole);
-            assert!(left.norm() < 1e-9 * all.norm(), "{name}, camera {camera}: {} of {}", left.norm(), all.norm());
+            // Motions at a time between two frames are about the axes of the IMU at the frame.
+            let tolerance = if name == "interleaved" { 2e-3 } else { 1e-9 };
+            assert!(left.norm() < tolerance * all.norm(), "{name}, camera {camera}: {} of {}", left.norm(), all.norm());
         }
     }
 }

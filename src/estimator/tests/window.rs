@@ -33,6 +33,8 @@ pub(super) fn windows() -> Vec<(&'static str, TestWindow)> {
         ("rigid", fixture::window(Parameterization::Minimal, false, quadratic())),
         ("cluster", fixture::cluster_window(quadratic(), false)),
         ("cluster with clocks", fixture::cluster_window(quadratic(), true)),
+        ("interleaved", fixture::interleaved_window(quadratic(), false)),
+        ("interleaved with clocks", fixture::interleaved_window(quadratic(), true)),
         (
             "rigid, rolling",
             fixture::changed_window(false, quadratic(), |config| {
@@ -82,6 +84,8 @@ fn the_gradient_of_every_factor_meets_central_differences() {
             let tolerance = match name {
                 "poe" => 2e-2,
                 name if name.ends_with("rolling") => 2e-3,
+                // Between IMU samples a rotation has a constant rate, a rate does not.
+                "interleaved with clocks" => 5e-3,
                 _ => 2e-5,
             };
             let scale = gradient.amax().min(1e3 + gradient[column].abs());

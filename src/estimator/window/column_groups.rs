@@ -51,7 +51,7 @@ impl WindowState {
         let profiles: Vec<Vec<ImuSample>> = (0..self.frames.len()).map(|slot| self.samples_after(slot)).collect();
         for (frame, after) in self.frames.iter_mut().zip(&profiles) {
             let bias = frame.state.navigation.bias;
-            let profile = setup.motion_profile(frame.motion.samples(), after, bias);
+            let profile = setup.motion_profile([frame.motion.samples(), after], &frame.state.rates.image_times_s, bias);
             let motion = setup.initial_joint_motion(frame.encoder.as_ref(), frame.state.joints_rad.len());
             let changed = |state: &mut FrameState| {
                 if state.joint_motion.is_empty() {

@@ -80,7 +80,9 @@ impl Setup {
             self.with_sensors(rigid, index + 1, camera.timeshift_s, false)
         });
         let estimated = config.calibrate && config.estimate_imu_intrinsics;
-        Calibrations::new(main, rigid).with_imu(estimated.then(|| ImuCalibration::new(config.imu_intrinsics)))
+        Calibrations::new(main, rigid)
+            .with_imu(estimated.then(|| ImuCalibration::new(config.imu_intrinsics)))
+            .with_frame_camera(config.frame_camera)
     }
 
     /// Prior of the biases from an earlier pass.
@@ -110,30 +112,37 @@ impl Setup {
         calibration.with_sensors(columns).with_given_readout(sensor.readout_s).with_given_gimbal_imu(gimbal_imu)
     }
 
-    /// True if some camera has a rolling shutter, so that camera poses depend on the motion after the stamp.
+    /// True if some images are exposed at other times than the stamp of their frame, so that camera poses depend on the
+    /// motion of the vehicle.
     pub(crate) fn has_moving_rows(&self) -> bool {
+        self.config.frame_camera.is_some() || self.has_rolling_shutter()
+    }
+
+    fn has_rolling_shutter(&self) -> bool {
         let config = &self.config;
         let given = |camera: usize| config.sensor(camera).readout_s != 0.0;
         (config.estimate_readout && config.calibrate) || (0..=config.rigid_cameras.len()).any(given)
     }
 
-    /// Motion of the vehicle after a stamp, from the samples before and after it; `None` if camera poses do not depend
-    /// on it.
+    /// Motion of the vehicle near a stamp, from the samples before and after it and the times of the images; `None` if
+    /// camera poses do not depend on it.
     pub(crate) fn motion_profile(
         &self,
-        before: &[ImuSample],
-        after: &[ImuSample],
+        [before, after]: [&[ImuSample]; 2],
+        image_times_s: &[f64],
         bias: ImuBias,
     ) -> Option<MotionProfile> {
         let samples = if after.is_empty() { &before[before.len().saturating_sub(1)..] } else { after };
-        let profile = || MotionProfile::new(samples, bias, self.gravity_in_world);
+        let earliest_s = image_times_s.iter().copied().fold(0.0, f64::min);
+        let profile =
+            || Some(MotionProfile::new(samples, bias, self.gravity_in_world)?.with_motion_before(before, earliest_s));
         self.has_moving_rows()
             .then(|| profile().unwrap_or_else(|| MotionProfile::stationary(bias, self.gravity_in_world)))
     }
 
     /// Initial joint rates and joint accelerations of the solver; empty if camera poses do not depend on them.
     pub(crate) fn initial_joint_motion(&self, encoder: Option<&JointAngles>, joints: usize) -> Vec<f64> {
-        let count = if self.has_moving_rows() { 2 * joints } else { 0 };
+        let count = if self.has_rolling_shutter() { 2 * joints } else { 0 };
         (0..count).map(|place| measured_joint_motion(encoder, place, joints).0).collect()
     }
 

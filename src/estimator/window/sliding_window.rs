@@ -153,8 +153,8 @@ impl SlidingWindow {
             encoder.as_ref().map_or_else(|| last.state.joints_rad.clone(), |encoder| encoder.angles_rad.clone())
         });
         let joint_motion = setup.initial_joint_motion(encoder.as_ref(), joints_rad.len());
-        let profile = setup.motion_profile(input.imu, input.imu_after, navigation.bias);
-        let rates = Rates::at(input.imu, encoder.as_ref(), profile);
+        let profile = setup.motion_profile([input.imu, input.imu_after], input.image_times_s, navigation.bias);
+        let rates = Rates::at(input.imu, encoder.as_ref(), profile, input.image_times_s);
         let state = FrameState { navigation, joints_rad, joint_motion, gimbal_imu: predicted.state, rates };
         let frame = Frame::new(input.frame_index, input.stamp_ns, state, encoder, motion);
         window.frames.push(Frame { keyframe: false, ..frame.with_gimbal_motion(predicted.motion) });

@@ -23,6 +23,7 @@ use std::thread::JoinHandle;
 use self::frames::FrameSource;
 pub use self::frames::SensorFrame;
 pub use self::joint_angles::nominal_joint_sigma_rad;
+pub(crate) use self::sensor_samples::image_stamps;
 pub use self::sensor_samples::{
     RecordedImage, SensorSamples, ground_truth_poses, imu_samples, joint_samples, recorded_images,
 };

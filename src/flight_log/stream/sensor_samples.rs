@@ -98,6 +98,21 @@ pub fn recorded_images(
     Ok(SensorSamples::new(log, Box::new(source)))
 }
 
+/// Stamps of a camera's images on the clock of the IMU, in nanoseconds since the start of the log, of messages with log
+/// times at or after `from_ns`; images are not decoded.
+///
+/// # Errors
+/// If the log lacks the camera's topic.
+pub(crate) fn image_stamps(
+    log: &Arc<FlightLog>,
+    camera: &CameraRig,
+    from_ns: i64,
+) -> Result<SensorSamples<i64>, LogError> {
+    let mut images = CameraStream::new(log, camera, from_ns)?;
+    let source = move |context: &mut ReadContext| Some(images.next(context)?.0 + images.shift_ns);
+    Ok(SensorSamples::new(log, Box::new(source)))
+}
+
 /// Angles of all joints as recorded, in IMU time: readings of encoders, or angles computed from the attitudes of the
 /// gimbal. `None` without a gimbal or its topic.
 ///

@@ -148,6 +148,7 @@ fn run_on(flight: &SyntheticFlight, name: &str) -> RunRecord {
             stamp_ns: frame.stamp_ns,
             imu: &frame.imu,
             imu_after: &[],
+            image_times_s: &[],
             gimbal_imu: &[],
             joint_angles: joint_angles.as_ref(),
             tracks: &frame.tracks,

@@ -13,6 +13,8 @@ mod configuration;
 mod corrections;
 mod flight_noise;
 mod fork;
+mod frame_camera;
+mod frame_sets;
 mod history;
 mod image_rotations;
 mod passes;
@@ -22,7 +24,6 @@ mod run_engine;
 mod shifted_imu;
 mod step_inputs;
 mod stopwatch;
-mod synchronized_frames;
 mod threads;
 mod tracker;
 

@@ -28,7 +28,7 @@ pub(in crate::session) struct EarlierPasses<'a> {
 pub(in crate::session) enum PassFailure {
     /// The session was closed.
     Closed,
-    /// An input or a step failed; the reason for the record.
+    /// A step failed; the reason for the record.
     Failed(String),
 }
 
@@ -39,13 +39,12 @@ impl EarlierPasses<'_> {
         &self,
         number: usize,
         config: &EstimatorConfig,
-        inputs: impl Iterator<Item = Result<Arc<OwnedStepInput>, String>>,
+        inputs: impl Iterator<Item = Arc<OwnedStepInput>>,
     ) -> Result<EstimatorConfig, PassFailure> {
         let mut engine = RunEngine::new(config.clone(), None);
         let (mut begin_ns, mut newest_ns) = (None, 0);
         let mut found: Option<EarlierPass> = None;
         for (step, input) in inputs.enumerate() {
-            let input = input.map_err(PassFailure::Failed)?;
             newest_ns = input.stamp_ns;
             begin_ns.get_or_insert(newest_ns);
             guarded(newest_ns, || engine.step_without_rank(&input)).map_err(PassFailure::Failed)?;

@@ -163,6 +163,7 @@ impl RunEngine {
             stamp_ns: input.stamp_ns,
             imu: &imu,
             imu_after: &imu_after,
+            image_times_s: &input.image_times_s,
             gimbal_imu,
             joint_angles: noisy.as_ref().or(angles),
             tracks: &altered[0],

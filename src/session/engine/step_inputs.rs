@@ -13,7 +13,7 @@ use crate::observability::RankReport;
 use crate::sensors::{ImuSample, JointAngles};
 use crate::session::record::{StepRecord, tracks_bytes};
 
-/// Input of one step: measurements of one camera or of a synchronized frame set.
+/// Input of one step: measurements of one camera, or of a set of images.
 ///
 /// Three types carry measurements from the log to the estimator. A [`SensorFrame`] holds the data of one image of one
 /// camera from the log: it owns the image, which is not needed after the front end, and has no tracks. The estimator's
@@ -31,11 +31,13 @@ pub(in crate::session) struct OwnedStepInput {
     pub(in crate::session) log_time_ns: i64,
     /// IMU samples from the stamp of the previous input to this one, both ends included.
     pub(in crate::session) imu: Vec<ImuSample>,
-    /// IMU samples from the stamp on, for the rows of rolling shutters; empty where no run needs them.
+    /// IMU samples from the stamp on, for the rows of rolling shutters and later images; empty where no run needs them.
     pub(in crate::session) imu_after: Vec<ImuSample>,
+    /// Stamps of the images after the step's in seconds, by camera; empty if all have its stamp.
+    pub(in crate::session) image_times_s: Vec<f64>,
     /// Samples of the IMU on the gimbal over the interval of `imu`; empty without one, or where they are missing.
     pub(in crate::session) gimbal_imu: Vec<ImuSample>,
-    /// Encoder readings at the stamp.
+    /// Encoder readings at the stamp of the main camera's image.
     pub(in crate::session) joint_angles: Option<JointAngles>,
     /// Tracks by camera, the main camera first; empty where an image is missing.
     pub(in crate::session) tracks: Vec<Arc<TrackedFrame>>,
@@ -65,6 +67,7 @@ impl OwnedStepInput {
             log_time_ns: frame.log_time_ns,
             imu: frame.imu,
             imu_after: frame.imu_after,
+            image_times_s: Vec::new(),
             gimbal_imu: frame.gimbal_imu,
             joint_angles: frame.joint_angles,
             tracks: vec![Arc::new(tracks)],
@@ -89,6 +92,7 @@ impl OwnedStepInput {
         allocated_bytes(size_of::<Self>() + 2 * size_of::<usize>())
             + allocated_bytes(self.imu.capacity() * size_of::<ImuSample>())
             + allocated_bytes(self.imu_after.capacity() * size_of::<ImuSample>())
+            + allocated_bytes(self.image_times_s.capacity() * size_of::<f64>())
             + allocated_bytes(self.gimbal_imu.capacity() * size_of::<ImuSample>())
             + self.joint_angles.as_ref().map_or(0, |angles| allocated_bytes(angles.heap_bytes()))
             + rigid
@@ -182,6 +186,7 @@ mod tests {
                 log_time_ns: 0,
                 imu: Vec::new(),
                 imu_after: Vec::new(),
+                image_times_s: Vec::new(),
                 gimbal_imu: Vec::new(),
                 joint_angles: None,
                 tracks: vec![Arc::default()],

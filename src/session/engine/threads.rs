@@ -11,11 +11,13 @@ use std::thread::{Builder, JoinHandle};
 
 use super::computation::{Computation, EngineMessage};
 use super::configuration::estimator_config;
+use super::frame_camera::FrameCamera;
+use super::frame_sets::FrameSets;
 use super::history::History;
 use super::passes::{EarlierPasses, PassFailure, guarded};
 use super::run_engine::RunEngine;
 use super::step_inputs::OwnedStepInput;
-use super::synchronized_frames::SynchronizedFrames;
+
 use super::tracker::CameraTracker;
 use crate::estimator::EstimatorConfig;
 use crate::session::plan::{RunSpec, SessionError, SessionPlan, cameras_of_run};
@@ -68,15 +70,17 @@ impl Engine {
             for camera in cameras_of_run(&plan.rig, spec)?.iter() {
                 let (queue, receiver) = sync_channel(FRAME_QUEUE_CAPACITY);
                 queues.entry(&camera.key).or_default().push(queue);
-                frames.push((camera.key.clone(), receiver));
+                frames.push(receiver);
             }
-            let config = config_with_prior(plan, spec)?;
+            let mut config = config_with_prior(plan, spec)?;
+            let frame_camera = frame_camera_of_run(plan, spec, &config)?;
+            config.frame_camera = frame_camera.map(|found| found.camera);
             let (passes, keep_linearization_every) = (spec.passes, plan.keep_linearization_every);
             let results = sender.clone();
             let Some(history) = computation.history(run).cloned() else { continue };
             self.threads.push(spawn(format!("estimator {run}"), move || {
                 let run = RunOverLog { run, passes, config, keep_linearization_every, history, results };
-                run.start(SynchronizedFrames::new(frames));
+                run.start(FrameSets::new(frames, frame_camera));
             })?);
         }
         for (camera_key, queues) in queues {
@@ -102,7 +106,7 @@ impl Engine {
         let Some(results) = self.sender.clone() else { return Ok(()) };
         self.threads.push(spawn(format!("fork {run}"), move || {
             let inputs = (history.begin()..).map_while(|step| history.inputs().wait_for(step));
-            run_steps(run, engine, inputs.map(Ok), &history, &results);
+            run_steps(run, engine, inputs, &history, &results);
         })?);
         Ok(())
     }
@@ -172,6 +176,16 @@ fn config_with_prior(plan: &SessionPlan, spec: &RunSpec) -> Result<EstimatorConf
     Ok(EstimatorConfig { calibration_prior: Some(Arc::new(prior)), ..config })
 }
 
+/// Camera at whose images the frames of a run lie, as [`FrameCamera::of_run`] finds it.
+fn frame_camera_of_run(
+    plan: &SessionPlan,
+    spec: &RunSpec,
+    config: &EstimatorConfig,
+) -> Result<Option<FrameCamera>, SessionError> {
+    let cameras: Vec<_> = cameras_of_run(&plan.rig, spec)?.iter().collect();
+    Ok(FrameCamera::of_run(&plan.log, &cameras, plan.start_s, config.gimbal_imu.is_some())?)
+}
+
 struct RunOverLog {
     run: usize,
     passes: usize,
@@ -182,18 +196,11 @@ struct RunOverLog {
 }
 
 impl RunOverLog {
-    /// Runs the passes over the synchronized frame sets, stores each set in the history, and reports each step of the
-    /// last pass.
-    fn start(self, mut frames: SynchronizedFrames) {
+    /// Runs the passes over the frame sets, stores each set in the history, and reports each step of the last pass.
+    fn start(self, mut frames: FrameSets) {
         let history = &self.history;
-        let tracked = std::iter::from_fn(|| match frames.next() {
-            Ok(input) => input.map(|input| {
-                history.inputs().push(Arc::clone(&input));
-                Ok(input)
-            }),
-            Err(reason) => Some(Err(reason.to_string())),
-        });
-        let again = || (0..).map_while(|step| history.inputs().get(step)).map(Ok);
+        let tracked = std::iter::from_fn(|| frames.next().inspect(|input| history.inputs().push(Arc::clone(input))));
+        let again = || (0..).map_while(|step| history.inputs().get(step));
         if self.passes == 1 {
             self.last_pass(self.config.clone(), tracked);
             history.inputs().end();
@@ -219,7 +226,7 @@ impl RunOverLog {
         }
     }
 
-    fn last_pass(&self, config: EstimatorConfig, inputs: impl Iterator<Item = Result<Arc<OwnedStepInput>, String>>) {
+    fn last_pass(&self, config: EstimatorConfig, inputs: impl Iterator<Item = Arc<OwnedStepInput>>) {
         let engine = RunEngine::new(config, self.keep_linearization_every);
         run_steps(self.run, engine, inputs, &self.history, &self.results);
     }
@@ -229,19 +236,12 @@ impl RunOverLog {
 fn run_steps(
     run: usize,
     mut engine: RunEngine,
-    inputs: impl Iterator<Item = Result<Arc<OwnedStepInput>, String>>,
+    inputs: impl Iterator<Item = Arc<OwnedStepInput>>,
     history: &History,
     results: &SyncSender<EngineMessage>,
 ) {
     let mut error = None;
     for (step, input) in (history.begin()..).zip(inputs) {
-        let input = match input {
-            Ok(input) => input,
-            Err(reason) => {
-                error = Some(reason);
-                break;
-            }
-        };
         history.before_step(step, &engine, &input);
         let record = match guarded(input.stamp_ns, || engine.step(&input)) {
             Ok(record) => record,

@@ -15,6 +15,7 @@ pub(in crate::session) fn input_of(frame: &SyntheticFrame, encoder_sigma_rad: f6
         log_time_ns: frame.stamp_ns,
         imu: frame.imu.clone(),
         imu_after: Vec::new(),
+        image_times_s: Vec::new(),
         gimbal_imu: frame.gimbal_imu.clone(),
         joint_angles: frame.encoder_angles(encoder_sigma_rad),
         tracks: vec![Arc::new(frame.tracks.clone())],

@@ -26,7 +26,7 @@ fn recorded_in_passes(flight: &SyntheticFlight, text: &str) -> (RunRecord, Vec<E
     let (results, progress) = sync_channel(inputs.len());
     let earlier = EarlierPasses { run: 3, results: &results };
     for number in 1..spec.passes {
-        config = earlier.run(number, &config, inputs.iter().cloned().map(Ok)).ok().expect("the pass ends");
+        config = earlier.run(number, &config, inputs.iter().cloned()).ok().expect("the pass ends");
     }
     let mut engine = RunEngine::new(config, None);
     let mut run = RunRecord::new(spec, "cam0".to_owned());

@@ -29,6 +29,7 @@ pub(super) fn experiment_scenario(experiment: Experiment, seed: u64, duration_s:
         lens: Lens::Pinhole,
         resolution_px: [640, 480],
         camera_rate_hz: 20.0,
+        static_camera_rate_hz: 20.0,
         camera_time_offset_s: 0.0,
         readout_s: 0.0,
         encoder_sigma_rad: gimbal_camera.then_some(0.01),

@@ -54,6 +54,7 @@ fn step(estimator: &mut Estimator, frame: &SyntheticFrame) -> (StepReport, Optio
         stamp_ns: frame.stamp_ns,
         imu: &frame.imu,
         imu_after: &[],
+        image_times_s: &[],
         gimbal_imu: &[],
         joint_angles: joints.as_ref(),
         tracks: &frame.tracks,
