@@ -48,11 +48,11 @@ pub(crate) struct SimulateArguments {
     /// Frame rate of the cameras in Hz.
     #[arg(long, value_name = "HZ", default_value_t = 20.0)]
     pub rate: f64,
-    /// Frame rate of the static camera in Hz [default: that of --rate].
+    /// Frame rate of the static camera in Hz [default: the rate of --rate].
     #[arg(long, value_name = "HZ", conflicts_with = "no_static_camera")]
     pub camera_rate: Option<f64>,
-    /// Time in milliseconds by which the images of the static camera are later than those of the gimbal camera: cameras
-    /// that are not triggered together.
+    /// Time in milliseconds by which the static camera exposes its images later than the gimbal camera: cameras that are
+    /// not triggered together.
     #[arg(long, value_name = "MS", default_value_t = 0.0, conflicts_with = "no_static_camera")]
     pub camera_phase: f64,
     /// Omit the static camera: half the computing time and half the file size.

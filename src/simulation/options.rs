@@ -36,7 +36,7 @@ pub struct SimulationOptions {
     pub camera_rate_hz: f64,
     /// Rate of the static camera; `None` for the rate of the gimbal camera.
     pub static_camera_rate_hz: Option<f64>,
-    /// Time of the static camera's images after those of the gimbal camera.
+    /// Time from an image of the gimbal camera to the next one of the static camera, in seconds, at the start.
     pub static_camera_phase_s: f64,
     /// True if the static camera is also recorded.
     pub static_camera: bool,
