@@ -76,3 +76,25 @@ impl LensValue {
         format!("{} to ±{:.2} {}", self.name, self.sigma, self.unit)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn focal_length(difference: f64, sigma: f64) -> LensValue {
+        let fault = Fault::new(FaultKind::Focal, &[1.0 + difference]);
+        let (name, unit) = ("focal length", "of its value");
+        LensValue { fault, name, unit, sigma, difference, sigmas: difference / sigma, useless: 0.05 }
+    }
+
+    #[test]
+    fn a_value_is_contradicted_verified_or_neither() {
+        let state = |value: &LensValue| (value.is_contradicted(), value.is_unverified());
+        assert_eq!(state(&focal_length(0.003, 0.001)), (false, false));
+        assert_eq!(state(&focal_length(0.12, 0.013)), (true, true));
+        // A stabilized camera hides an error of a twentieth; a known small one is no fault.
+        assert_eq!(state(&focal_length(0.01, 0.03)), (false, true));
+        assert_eq!(state(&focal_length(0.01, 0.001)), (false, false));
+        assert_eq!(focal_length(0.01, 0.03).precision(), "focal length to ±0.03 of its value");
+    }
+}
