@@ -8,7 +8,6 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::calibration_posterior::CameraPosterior;
-use super::calibrations::MAIN;
 use super::earlier_pass::FoundCamera;
 use super::given_chain::{EarlierPrior, GivenChain, GivenSigmas, PriorMeasurements};
 use super::sensor_columns::SensorColumn;
@@ -53,7 +52,7 @@ impl Values {
 pub(crate) struct Calibration {
     values: Values,
     given: Arc<GivenChain>,
-    /// Index among the cameras of the run.
+    /// Index among the cameras of the run; the main camera has 0.
     camera: usize,
     /// True if frames lie at the images of this camera and images of other cameras between them.
     has_frames: bool,
@@ -83,7 +82,7 @@ impl Calibration {
         Self {
             values,
             given: Arc::new(given),
-            camera: MAIN,
+            camera: 0,
             has_frames: false,
             sensors: Arc::default(),
             given_readout_s: 0.0,

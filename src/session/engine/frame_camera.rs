@@ -2,11 +2,13 @@
 
 use std::sync::Arc;
 
-use super::frame_sets::TOGETHER_NS;
 use crate::flight_log::{FlightLog, LogError, image_stamps};
 use crate::geometry::ns_from_seconds;
 use crate::sensors::{CameraMount, CameraRig};
 
+/// Largest difference of stamps of images that are triggered together. At an angular rate of 3 rad/s the vehicle rotates
+/// by 0.1° in that time, about one pixel.
+pub(super) const TOGETHER_NS: i64 = 500_000;
 /// Number of images of each camera, from the time on at which all have one, that are compared.
 const COMPARED_IMAGES: usize = 40;
 /// Ratio of images with another one of the same moment from which on the cameras count as triggered together.

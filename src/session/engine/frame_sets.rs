@@ -5,14 +5,11 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 
-use super::frame_camera::FrameCamera;
+use super::frame_camera::{FrameCamera, TOGETHER_NS};
 use super::step_inputs::OwnedStepInput;
 use crate::geometry::seconds_from_ns;
 use crate::sensors::ImuSample;
 
-/// Largest difference of stamps of images that are triggered together. At an angular rate of 3 rad/s the vehicle rotates
-/// by 0.1° in that time, about one pixel.
-pub(super) const TOGETHER_NS: i64 = 500_000;
 /// Offset of the indices of sets without an image of the main camera; larger than any index of the main camera.
 const MISSING_IMAGE_OFFSET: usize = 1 << 30;
 
