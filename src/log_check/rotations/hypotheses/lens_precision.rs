@@ -7,11 +7,11 @@ use crate::gimbal::ClassicalChain;
 use crate::log_check::rotations::data::RotationData;
 use crate::log_check::statistics::SIGNIFICANT_SIGMAS;
 
-/// Kinds of wrong lenses with the values of a right one, a name, and the unit of a difference.
-const LENS: [(FaultKind, &[f64], &str, &str); 3] = [
-    (FaultKind::Focal, &[1.0], "focal length", "of its value"),
-    (FaultKind::PrincipalPoint, &[0.0, 0.0], "principal point", "focal lengths"),
-    (FaultKind::Radial, &[0.0], "radial distortion", "in k1"),
+/// Kinds of wrong lenses with a name, and the unit of a difference.
+const LENS: [(FaultKind, &str, &str); 3] = [
+    (FaultKind::Focal, "focal length", "of its value"),
+    (FaultKind::PrincipalPoint, "principal point", "focal lengths"),
+    (FaultKind::Radial, "radial distortion", "of its coefficient"),
 ];
 /// Number of standard deviations from which on the rotations contradict a value: derivatives come from noisy images.
 const CONTRADICTED_SIGMAS: f64 = 5.0;
@@ -34,6 +34,15 @@ pub(in crate::log_check) struct LensValue {
     useless: f64,
 }
 
+/// Fault of a kind with the values of the rig's lens.
+fn right_lens(kind: FaultKind) -> Fault {
+    match kind {
+        FaultKind::Focal => Fault::new(kind, &[1.0]),
+        FaultKind::PrincipalPoint => Fault::new(kind, &[0.0, 0.0]),
+        _ => Fault::new(kind, &[0.0]),
+    }
+}
+
 impl LensValue {
     /// Values of a camera's lens, each one fitted alone, by at most some hundred of its rotations.
     pub(super) fn measured(data: &RotationData<'_>, chain: &ClassicalChain) -> Vec<Self> {
@@ -41,8 +50,8 @@ impl LensValue {
         let fitter = Fitter::new(&few, chain, f64::INFINITY);
         // Information grows with the number of rotations.
         let share = (few.measured.len() as f64 / data.measured.len() as f64).sqrt();
-        let of_value = |(kind, right, name, unit): (FaultKind, &[f64], &'static str, &'static str)| {
-            let mut fault = Fault::new(kind, right);
+        let of_value = |(kind, name, unit): (FaultKind, &'static str, &'static str)| {
+            let mut fault = right_lens(kind);
             let values = fitter.linear_values(&fault)?;
             for (number, (change, _)) in values.iter().enumerate() {
                 fault.change(number, *change);
