@@ -134,7 +134,7 @@ pub(super) fn check_against_gyroscope(
         hypotheses::explain_within_noise(&hand_eye.data.delayed(offset_s), &chain, suspects, tolerance_rad(&fit))
     });
     // A fault in a part of the log also changes the time offset that fits best.
-    let is_sound = within_noise.as_ref().is_some_and(|found| found.found.is_none());
+    let is_sound = within_noise.as_ref().is_some_and(|found| found.cause.is_none());
     hand_eye.report_time_offset(aligned, is_sound, findings);
     hand_eye.report_orientation(&fit, &pairs, &chain, offset_s, within_noise, findings)
 }
@@ -255,8 +255,8 @@ impl HandEye<'_> {
             }
             return HandEyeOutcome::Other;
         };
-        if let Some(found) = found.found {
-            found.report(key, &evidence, "", findings);
+        if let Some(cause) = found.cause {
+            cause.report(key, &evidence, "", findings);
         } else if fit.spread < MIN_SPREAD {
             let title = format!("{key} rotated about one axis only: its orientation cannot be checked");
             findings.unverified(Area::Extrinsics, title, evidence, "rotate about all axes");

@@ -21,7 +21,7 @@ use crate::geometry::seconds_from_ns;
 use crate::sensors::ImageMask;
 use crate::text::without_signed_zeros;
 
-/// What a finding is based on.
+/// Evidence on which a finding is based.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Basis {
     #[default]
@@ -295,8 +295,10 @@ impl Findings {
         evidence: impl Into<String>,
         remedy: impl Into<String>,
     ) {
-        let texts = [title.into(), evidence.into(), remedy.into()].map(without_signed_zeros);
-        self.push(Severity::Note, area, texts, Basis::Unverified);
+        self.add(Severity::Note, area, title, evidence, remedy);
+        if let Some(last) = self.list.last_mut() {
+            last.basis = Basis::Unverified;
+        }
     }
 
     /// Excludes a measurement, whose fault is reported, from later comparisons.

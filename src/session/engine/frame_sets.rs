@@ -15,7 +15,7 @@ const MISSING_IMAGE_OFFSET: usize = 1 << 30;
 
 /// Images of one camera of a run.
 #[derive(Debug)]
-pub(super) struct CameraInputs {
+struct CameraInputs {
     inputs: Receiver<Arc<OwnedStepInput>>,
     /// Received images that are in no set yet.
     waiting: VecDeque<Arc<OwnedStepInput>>,
@@ -23,7 +23,7 @@ pub(super) struct CameraInputs {
 }
 
 impl CameraInputs {
-    pub(super) fn new(inputs: Receiver<Arc<OwnedStepInput>>) -> Self {
+    fn new(inputs: Receiver<Arc<OwnedStepInput>>) -> Self {
         Self { inputs, waiting: VecDeque::new(), ended: false }
     }
 

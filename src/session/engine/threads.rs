@@ -17,7 +17,6 @@ use super::history::History;
 use super::passes::{EarlierPasses, PassFailure, guarded};
 use super::run_engine::RunEngine;
 use super::step_inputs::OwnedStepInput;
-
 use super::tracker::CameraTracker;
 use crate::estimator::EstimatorConfig;
 use crate::session::plan::{RunSpec, SessionError, SessionPlan, cameras_of_run};
@@ -66,14 +65,16 @@ impl Engine {
         let mut queues: BTreeMap<&str, Vec<SyncSender<Arc<OwnedStepInput>>>> = BTreeMap::new();
         for &run in runs {
             let (spec, _) = &plan.runs[run];
+            let cameras: Vec<_> = cameras_of_run(&plan.rig, spec)?.iter().collect();
             let mut frames = Vec::new();
-            for camera in cameras_of_run(&plan.rig, spec)?.iter() {
+            for camera in &cameras {
                 let (queue, receiver) = sync_channel(FRAME_QUEUE_CAPACITY);
                 queues.entry(&camera.key).or_default().push(queue);
                 frames.push(receiver);
             }
             let mut config = config_with_prior(plan, spec)?;
-            let frame_camera = frame_camera_of_run(plan, spec, &config)?;
+            let has_gimbal_imu = config.gimbal_imu.is_some();
+            let frame_camera = FrameCamera::of_run(&plan.log, &cameras, plan.start_s, has_gimbal_imu)?;
             config.frame_camera = frame_camera.map(|found| found.camera);
             let (passes, keep_linearization_every) = (spec.passes, plan.keep_linearization_every);
             let results = sender.clone();
@@ -174,16 +175,6 @@ fn config_with_prior(plan: &SessionPlan, spec: &RunSpec) -> Result<EstimatorConf
     let cameras: Vec<&str> = cameras_of_run(&plan.rig, spec)?.iter().map(|camera| camera.key.as_str()).collect();
     let prior = prior.of_run(&spec.label, &cameras, &plan.rig.joint_names(), &config)?;
     Ok(EstimatorConfig { calibration_prior: Some(Arc::new(prior)), ..config })
-}
-
-/// Camera at whose images the frames of a run lie, as [`FrameCamera::of_run`] finds it.
-fn frame_camera_of_run(
-    plan: &SessionPlan,
-    spec: &RunSpec,
-    config: &EstimatorConfig,
-) -> Result<Option<FrameCamera>, SessionError> {
-    let cameras: Vec<_> = cameras_of_run(&plan.rig, spec)?.iter().collect();
-    Ok(FrameCamera::of_run(&plan.log, &cameras, plan.start_s, config.gimbal_imu.is_some())?)
 }
 
 struct RunOverLog {

@@ -80,7 +80,7 @@ impl LensValue {
         self.difference + SIGNIFICANT_SIGMAS * self.sigma > self.useless
     }
 
-    /// Precision in words.
+    /// Name, standard deviation and unit.
     pub(in crate::log_check) fn precision(&self) -> String {
         format!("{} to ±{:.2} {}", self.name, self.sigma, self.unit)
     }

@@ -59,7 +59,7 @@ pub(in crate::log_check) enum Outcome {
 /// Causes of rotations that noise explains.
 pub(in crate::log_check) struct WithinNoise {
     /// Causes that are much more likely than none, if there are any.
-    pub(in crate::log_check) found: Option<Outcome>,
+    pub(in crate::log_check) cause: Option<Outcome>,
     /// Causes that explain the rotations as well as another orientation of the camera does, the most likely first.
     pub(in crate::log_check) instead_of_orientation: Vec<NamedCause>,
     /// Number of them that are more likely than another orientation.
@@ -96,19 +96,19 @@ pub(in crate::log_check) fn explain_within_noise(
 ) -> WithinNoise {
     let lens = LensValue::measured(data, chain);
     let unverified = lens.iter().filter(|value| value.is_unverified()).cloned().collect();
-    let none = WithinNoise { found: None, instead_of_orientation: Vec::new(), more_likely: 0, unverified };
+    let none = WithinNoise { cause: None, instead_of_orientation: Vec::new(), more_likely: 0, unverified };
     let Some(comparison) = Comparison::new(data, chain, suspects, orientation_tolerance_rad) else { return none };
     let given = comparison.criterion_given();
     let explains = |found: &&Fitted| found.fit.is_explained() && found.fault.is_noticeable();
     let is_decisive =
         |found: &&Fitted| found.criterion + DECISIVE_WITHIN_NOISE < given && found.removes_misfit(&comparison.given);
     if let Some(best) = comparison.fitted.first().filter(explains).filter(is_decisive) {
-        return WithinNoise { found: Some(comparison.decisive(best)), ..none };
+        return WithinNoise { cause: Some(comparison.decisive(best)), ..none };
     }
     if suspects.include(Sensor::Camera)
-        && let Some(found) = comparison.lens_within_noise(lens)
+        && let Some(cause) = comparison.lens_within_noise(lens)
     {
-        return WithinNoise { found: Some(found), ..none };
+        return WithinNoise { cause: Some(cause), ..none };
     }
     if !comparison.fitter.has_other_orientation(&comparison.given) {
         return none;
