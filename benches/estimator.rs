@@ -81,7 +81,7 @@ fn step(estimator: &mut Estimator, frame: &SyntheticFrame, encoder_sigma_rad: f6
         gimbal_imu: &[],
         joint_angles: joint_angles.as_ref(),
         tracks: &frame.tracks,
-        rigid_tracks: &[],
+        further_tracks: &[],
     })
 }
 

@@ -74,7 +74,7 @@
 //!         gimbal_imu: &[],
 //!         joint_angles: frame.encoder_angles(encoder_sigma_rad).as_ref(),
 //!         tracks: &frame.tracks,
-//!         rigid_tracks: &[],
+//!         further_tracks: &[],
 //!     });
 //!     // There is no window before the initialization.
 //!     if let Some(newest) = report.newest() {

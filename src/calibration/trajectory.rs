@@ -47,7 +47,7 @@ impl InitialTrajectory {
             gimbal_imu: &[],
             joint_angles: None,
             tracks: &view.tracks,
-            rigid_tracks: &[],
+            further_tracks: &[],
         });
         for event in report.events.iter().filter(|event| event.kind == EventKind::InitializationWaits) {
             self.waits.clone_from(&event.message);

@@ -18,7 +18,7 @@ pub use error::CameraError;
 pub use projection::Projection;
 pub use rational::RationalLens;
 
-use nalgebra::{Matrix2x3, Vector2, Vector3};
+use nalgebra::{Matrix2x3, UnitQuaternion, Vector2, Vector3};
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraModel {
@@ -123,6 +123,19 @@ impl CameraModel {
             && uv_px.y >= border_px
             && uv_px.x <= width as f64 - 1.0 - border_px
             && uv_px.y <= height as f64 - 1.0 - border_px
+    }
+
+    /// Ratio of the image of another camera, rotated by `here_from_other`, whose directions lie in the image of this one.
+    pub fn common_field(&self, other: &Self, here_from_other: &UnitQuaternion<f64>) -> f64 {
+        const STEPS: usize = 12;
+        let [width, height] = other.resolution_px.map(|size| size.saturating_sub(1) as f64 / STEPS as f64);
+        let grid = (0..=STEPS).flat_map(|row| (0..=STEPS).map(move |column| (column as f64, row as f64)));
+        let is_seen = |(column, row): &(f64, f64)| {
+            let bearing = other.unproject(&Vector2::new(column * width, row * height));
+            let uv_px = bearing.and_then(|bearing| self.project(&(here_from_other * bearing)));
+            uv_px.is_some_and(|uv_px| self.contains(&uv_px, 0.0))
+        };
+        grid.filter(is_seen).count() as f64 / ((STEPS + 1) * (STEPS + 1)) as f64
     }
 
     /// Geometric mean of the two focal lengths, which converts an angle at the image centre to pixels.

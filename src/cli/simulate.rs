@@ -55,6 +55,12 @@ pub(crate) struct SimulateArguments {
     /// not triggered together.
     #[arg(long, value_name = "MS", default_value_t = 0.0, conflicts_with = "no_static_camera")]
     pub camera_phase: f64,
+    /// Add a second static camera this many metres to the right of the static one: a stereo pair.
+    #[arg(long, value_name = "BASELINE", conflicts_with_all = ["no_static_camera", "rig"])]
+    pub stereo: Option<f64>,
+    /// Add a second camera on the gimbal, with a longer focal length.
+    #[arg(long, value_enum, value_name = "KIND", conflicts_with = "rig")]
+    pub gimbal_camera: Option<GimbalCameraArgument>,
     /// Omit the static camera: half the computing time and half the file size.
     #[arg(long)]
     pub no_static_camera: bool,
@@ -88,6 +94,13 @@ pub(crate) enum ExperimentArgument {
     T3,
     /// The paper's experiment T4.
     T4,
+}
+
+/// Cameras that `--gimbal-camera` adds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum GimbalCameraArgument {
+    /// Below the other one, with a field of view of 62° instead of 83°.
+    Thermal,
 }
 
 /// Surfaces with texture, as `--world` names them.
@@ -156,6 +169,8 @@ pub(crate) fn simulate(arguments: &SimulateArguments) -> Result<ExitOutcome> {
     options.static_camera_rate_hz = arguments.camera_rate;
     options.static_camera_phase_s = 1e-3 * arguments.camera_phase;
     options.static_camera = !arguments.no_static_camera;
+    options.stereo_baseline_m = arguments.stereo;
+    options.second_gimbal_camera = arguments.gimbal_camera.is_some();
     options.gimbal_imu_noise_scale = arguments.gimbal_imu;
     match arguments.encoder_sigma_deg {
         Some(EncoderArgument::None) => options.encoder_sigma_rad = None,

@@ -105,14 +105,10 @@ impl<'a> Writer<'a> {
         let start = columns.last().map_or(0, |last| last.start + last.len);
         columns.push(ColumnBlock { id: ColumnId::InverseDepth, start, len: 1 });
         let mut start = 0;
-        let cameras = source
-            .chains
-            .iter()
-            .zip(cameras)
-            .enumerate()
-            .map(|(camera, (_, model))| {
-                let camera = window_camera(report, source, &states, camera, model, start);
-                start += camera.columns;
+        let cameras = (0..source.chains.len())
+            .map(|camera| {
+                let camera = window_camera(report, source, &states, camera, cameras, start);
+                start = camera.start + camera.columns;
                 camera
             })
             .collect();
@@ -126,19 +122,20 @@ impl<'a> Writer<'a> {
         let slot_of = |number: usize| self.report.window.iter().position(|frame| frame.frame_index == number);
         let anchor = slot_of(feature.anchor_frame_index)?;
         let width = self.columns.last().map_or(0, |last| last.start + last.len);
-        let mut rows = DMatrix::zeros(2 * feature.observations.len(), width);
+        let mut rows = DMatrix::zeros(2 * (feature.observations.len() + feature.matched.len()), width);
         let mut frames = Vec::new();
         let anchored = feature.observations.iter().find(|seen| seen.frame_index == feature.anchor_frame_index)?;
-        let anchored = TrackObservation { slot: anchor, uv_px: anchored.measured_px };
+        let anchored = TrackObservation { slot: anchor, matched: false, uv_px: anchored.measured_px };
         let landmark = self.landmark(index, feature, &camera.current.pose(anchor, &anchored.uv_px))?;
         let anchor = Anchor::new(&camera.current, &camera.linearized, &anchored);
-        for seen in feature.observations.iter() {
+        let matched = feature.matched.iter().map(|seen| (true, seen));
+        for (matched, seen) in feature.observations.iter().map(|seen| (false, seen)).chain(matched) {
             let Some(slot) = slot_of(seen.frame_index) else { continue };
-            let observation = TrackObservation { slot, uv_px: seen.measured_px };
+            let observation = TrackObservation { slot, matched, uv_px: seen.measured_px };
             // Stored residuals are rounded: take the robust weight of the step instead of recomputing it.
             let weight = RobustWeight::Known(seen.robust_weight);
             let mut target = rows.rows_mut(2 * frames.len(), 2);
-            let written = match camera.current.blocks_per_frame() {
+            let written = match camera.current.blocks_per_image() {
                 1 => self.write::<1>(&mut target, camera, &anchor, &landmark, &observation, weight),
                 _ => self.write::<ROLLING_BLOCKS>(&mut target, camera, &anchor, &landmark, &observation, weight),
             };
@@ -215,22 +212,25 @@ fn window_camera<'a>(
     source: &'a JacobianSource,
     states: &[FrameState],
     camera: usize,
-    model: &'a CameraModel,
+    models: &[&'a CameraModel],
     start: usize,
 ) -> WindowCamera<'a> {
+    let model = models[camera];
     let (sigma_px, landmark_model) = (source.pixel_sigmas_px[camera], source.landmark_model);
     // The robust weights are known.
     let visual =
         VisualModel { camera: model, sigma_px, loss: RobustLoss::None, track_loss: RobustLoss::None, landmark_model };
     if let Some(exact) = &source.exact {
-        let (current, linearized) = (exact.current.1.of(camera), exact.linearized.1.of(camera));
+        let ((now, current), (then, linearized)) = (&exact.current, &exact.linearized);
+        let columns = linearized.pose_columns(camera);
+        let given = |camera: usize| models[camera];
         return WindowCamera {
             model: visual,
-            current: CameraView::new(&exact.current.0, current, model),
-            linearized: CameraView::new(&exact.linearized.0, linearized, model),
-            maps: CameraMaps::new(&exact.linearized.0, linearized),
-            start,
-            columns: linearized.dof(),
+            current: CameraView::new(now, current, camera, &given),
+            linearized: CameraView::new(then, linearized, camera, &given),
+            maps: CameraMaps::new(then, linearized, camera),
+            start: columns.start,
+            columns: columns.len(),
         };
     }
     let chain = &source.chains[camera];
@@ -238,6 +238,7 @@ fn window_camera<'a>(
     let [then_s, now_s] = clocks.shifts_s;
     let sensor = CameraCalibration {
         chain: Cow::Borrowed(chain),
+        mounted: None,
         camera,
         columns: if source.calibrated { chain.dof() + clocks.count } else { 0 },
         shift_s: then_s,
@@ -248,9 +249,9 @@ fn window_camera<'a>(
         intrinsics: 0..0,
     };
     let columns = sensor.columns;
-    let maps = CameraMaps::of_sensor(states, &sensor);
+    let maps = CameraMaps::of_sensors(states, std::slice::from_ref(&sensor));
     let linearized = CameraView::of_sensor(Cow::Owned(states.to_vec()), sensor, Cow::Borrowed(model), false);
-    let rigid = camera.checked_sub(1).and_then(|rigid| report.calibration.rigid_cameras.get(rigid));
+    let rigid = camera.checked_sub(1).and_then(|rigid| report.calibration.further_cameras.get(rigid));
     let now = report.window.iter().zip(states).map(|(frame, state)| {
         let mut state = state.clone();
         state.navigation.world_from_imu = frame.world_from_imu;
@@ -258,7 +259,7 @@ fn window_camera<'a>(
         state.joints_rad.clone_from(&frame.joint_angles_rad);
         let seen = camera_pose::state_at(&state, &state.rates.exposure(camera, now_s));
         let imu_from_observer = match rigid {
-            Some((_, extrinsics)) => *extrinsics,
+            Some(rigid) => rigid.base_from_camera,
             // Without a time offset the reported camera pose applies.
             None if now_s == 0.0 => frame.imu_from_camera,
             None => {

@@ -21,8 +21,9 @@ mod tests;
 mod window;
 
 pub use config::{
-    CameraSensorPrior, DEFAULT_CHAIN_PRIOR, EstimatorConfig, EstimatorOptions, KEYFRAME_JOINT_INTERVAL_S,
-    KEYFRAME_JOINT_RAD, RigidCamera, TrackContinuation, VisualLoss, imu_columns, imu_intrinsics, rigid_columns,
+    CameraSensorPrior, DEFAULT_CHAIN_PRIOR, EstimatorConfig, EstimatorOptions, FurtherCamera,
+    KEYFRAME_JOINT_INTERVAL_S, KEYFRAME_JOINT_RAD, TrackContinuation, VisualLoss, imu_columns, imu_intrinsics,
+    pose_columns,
 };
 pub use estimator::Estimator;
 pub use explain::{FeatureRows, StepJacobian};
@@ -37,8 +38,8 @@ pub use problem::linearization::Linearization;
 pub use problem::solver::IterationReport;
 pub use report::{
     CalibrationEstimate, Event, EventKind, FactorRows, FailureCause, FeatureCounts, FeatureReport, FrameStateReport,
-    JacobianFactor, JacobianRow, JacobianSource, LandmarkReport, ObservationReport, Observations, Phase,
-    PoseCovariance, ReportBytes, ResidualSummary, Stage, StageTimes, StepReport, StepWarning,
+    FurtherCameraEstimate, JacobianFactor, JacobianRow, JacobianSource, LandmarkReport, ObservationReport,
+    Observations, Phase, PoseCovariance, ReportBytes, ResidualSummary, Stage, StageTimes, StepReport, StepWarning,
 };
 pub use state::allocation::allocated_bytes;
 pub use state::calibration::INACCURATE_ROTATION_RAD;
@@ -47,5 +48,5 @@ pub use state::columns::{ColumnBlock, ColumnGroup, ColumnId, FrameId};
 pub use state::earlier_pass::{BiasPrior, EarlierPass};
 pub use state::navigation::GimbalImuState;
 pub use state::preintegration::{self, ImuBias, MotionIncrement, NavigationState, Preintegration};
-pub use step_input::{StepInput, StepMeasurements};
+pub use step_input::{OTHER_CAMERA_FRAMES, StepInput, StepMeasurements};
 pub use window::setup::gravity_in_world;

@@ -1,10 +1,14 @@
 use crate::frontend::{TrackedFeature, TrackedFrame};
 use crate::sensors::{ImuSample, JointAngles};
 
+/// First index of the frames at images of the second camera of a run without one of the main camera, twice that of those of
+/// the third: larger than any index of the main camera's images.
+pub const OTHER_CAMERA_FRAMES: usize = 1 << 30;
+
 /// Measurements of one image as input of the estimator.
 #[derive(Clone, Debug)]
 pub struct StepInput<'a> {
-    /// Index of the image in its camera's stream.
+    /// Index of the image in its camera's stream, plus [`OTHER_CAMERA_FRAMES`] times the camera's index in the run.
     pub frame_index: usize,
     /// Header stamp of the image since the start of the log.
     pub stamp_ns: i64,
@@ -23,9 +27,9 @@ pub struct StepInput<'a> {
     pub joint_angles: Option<&'a JointAngles>,
     /// Tracked features of the main camera; empty if it has no image in this frame set.
     pub tracks: &'a TrackedFrame,
-    /// Tracked features of [`crate::estimator::EstimatorConfig::rigid_cameras`] in the same frame set, in their
+    /// Tracked features of [`crate::estimator::EstimatorConfig::further_cameras`] in the same frame set, in their
     /// order; empty where an image is missing.
-    pub rigid_tracks: &'a [&'a TrackedFrame],
+    pub further_tracks: &'a [&'a TrackedFrame],
 }
 
 impl StepInput<'_> {
@@ -33,7 +37,15 @@ impl StepInput<'_> {
     pub(crate) fn features(&self, camera: usize) -> &[TrackedFeature] {
         match camera.checked_sub(1) {
             None => &self.tracks.features,
-            Some(rigid) => self.rigid_tracks.get(rigid).map_or(&[], |tracks| &tracks.features),
+            Some(rigid) => self.further_tracks.get(rigid).map_or(&[], |tracks| &tracks.features),
+        }
+    }
+
+    /// Features of a camera that the other one of its stereo pair observes as well.
+    pub(crate) fn matched(&self, camera: usize) -> &[TrackedFeature] {
+        match camera.checked_sub(1) {
+            None => &self.tracks.matched,
+            Some(further) => self.further_tracks.get(further).map_or(&[], |tracks| &tracks.matched),
         }
     }
 
@@ -59,4 +71,6 @@ pub trait StepMeasurements {
     fn gimbal_imu(&self) -> &[ImuSample];
     /// Features of a camera, ordered by id; index 0 is the main camera.
     fn features(&self, camera: usize) -> &[TrackedFeature];
+    /// Those that the other camera of a stereo pair observes as well, ordered by id.
+    fn matched(&self, camera: usize) -> &[TrackedFeature];
 }

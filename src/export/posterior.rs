@@ -91,9 +91,11 @@ impl<'a> NamedPosterior<'a> {
     /// Names of the columns.
     fn names(&self) -> Vec<String> {
         let names = self.rig.parameter_names();
-        let columns = self.posterior.cameras.iter().enumerate().flat_map(|(place, camera)| {
-            camera.parameters.iter().map(move |parameter| parameter.of_camera(place as u8))
-        });
+        let numbers = numbers(self.rig, &self.cameras);
+        let columns =
+            self.posterior.cameras.iter().zip(numbers).flat_map(|(camera, number)| {
+                camera.parameters.iter().map(move |parameter| parameter.of_camera(number))
+            });
         columns.map(|parameter| names.name(parameter)).collect()
     }
 
@@ -255,8 +257,10 @@ fn posterior_of(file: &PosteriorFile, rig: &Rig) -> Result<CalibrationPosterior,
     if file.joints != rig.joint_names() {
         return Err(format!("its joints are not those of the {RIG} beside it"));
     }
-    let camera = |(place, entry): (usize, &CameraEntry)| camera_of(place, entry, rig);
-    let cameras: Vec<CameraPosterior> = file.cameras.iter().enumerate().map(camera).collect::<Result<_, _>>()?;
+    let keys: Vec<String> = file.cameras.iter().map(|camera| camera.key.clone()).collect();
+    let numbered = file.cameras.iter().zip(numbers(rig, &keys));
+    let cameras: Vec<CameraPosterior> =
+        numbered.map(|(entry, number)| camera_of(number, entry, rig)).collect::<Result<_, _>>()?;
     let count: usize = cameras.iter().map(|camera| camera.parameters.len()).sum();
     let rows = &file.covariance;
     if count == 0 || rows.len() != count || rows.iter().any(|row| row.len() != count) {
@@ -270,14 +274,20 @@ fn posterior_of(file: &PosteriorFile, rig: &Rig) -> Result<CalibrationPosterior,
     Ok(CalibrationPosterior { cameras, covariance })
 }
 
-fn camera_of(place: usize, entry: &CameraEntry, rig: &Rig) -> Result<CameraPosterior, String> {
+/// Numbers of cameras in the names of parameters, the main camera first.
+fn numbers(rig: &Rig, keys: &[String]) -> Vec<u8> {
+    let number = |(place, key): (usize, &String)| if place == 0 { 0 } else { rig.camera_number(key) };
+    keys.iter().enumerate().map(number).collect()
+}
+
+fn camera_of(camera: u8, entry: &CameraEntry, rig: &Rig) -> Result<CameraPosterior, String> {
     let key = printable(&entry.key);
     let chain = rig.chain_of_camera(&entry.key).ok_or_else(|| format!("the {RIG} beside it has no camera '{key}'"))?;
     let parameterization: Parameterization = entry
         .parameterization
         .parse()
         .map_err(|problem: UnknownParameterization| printable(&problem.to_string()).into_owned())?;
-    let (names, camera) = (rig.parameter_names(), u8::try_from(place).unwrap_or(u8::MAX));
+    let names = rig.parameter_names();
     let parse = |column: &ColumnEntry| {
         let parameter = names.parse(&column.name);
         let parameter = parameter.filter(|parameter| parameter.of_camera(camera) == *parameter);

@@ -2,7 +2,7 @@
 
 use crate::calibration::stills::StillsOutcome;
 use crate::flight_log::rig_template::TYPICAL_IMU_NOISE;
-use crate::geometry::Dimension;
+use crate::geometry::{Dimension, RigidTransform};
 use crate::sensors::{
     AssumedField, CameraMount, CameraRig, ChainPrior, GimbalRig, ImuIntrinsics, ImuRig, Joint, RequiredAccuracy, Rig,
     StillCamera, Stills,
@@ -22,6 +22,8 @@ const ASSUMED_PRIOR: ChainPrior = ChainPrior { translation_bound_m: 0.01, rotati
 pub(super) fn rig_of_stills(stills: &Stills, outcome: &StillsOutcome) -> Rig {
     let camera = |index: usize, camera: &StillCamera, mount: CameraMount| CameraRig {
         key: format!("cam{index}"),
+        first_from_camera: RigidTransform::identity(),
+        relative_prior: None,
         mount,
         topic: format!("/{}/image", camera.name),
         use_log_time: false,

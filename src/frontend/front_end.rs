@@ -128,6 +128,11 @@ impl FrontEnd {
         &self.camera
     }
 
+    /// Levels of the last processed image; empty before the first one.
+    pub fn last_image(&self) -> &Pyramid {
+        &self.previous
+    }
+
     /// Processes the next image and returns its features.
     ///
     /// `predicted` is the rotation since the last processed image, as from
@@ -170,7 +175,7 @@ impl FrontEnd {
                 reference.or_else(|| ReferencePatch::cut(image, &self.camera, &feature.uv_px, &Vector2::zeros())),
         }));
         std::mem::swap(&mut self.previous, &mut self.now);
-        Ok(TrackedFrame { stamp_ns, features, statistics })
+        Ok(TrackedFrame { stamp_ns, features, matched: Vec::new(), statistics })
     }
 
     fn check(&self, image: &GrayImage) -> Result<(), FrontEndError> {

@@ -23,6 +23,7 @@ pub mod readout;
 mod reference;
 mod resample;
 mod responses;
+mod stereo;
 #[cfg(test)]
 mod tests;
 mod tracks;
@@ -33,5 +34,6 @@ pub use prediction::{
 };
 pub use pyramid::Pyramid;
 pub use reference::ReferenceOptions;
+pub use stereo::{StereoCamera, StereoMatcher};
 pub(crate) use tracks::ObservedPixel;
 pub use tracks::{FeatureId, FrontEndStatistics, TrackedFeature, TrackedFrame};

@@ -72,5 +72,8 @@ pub struct TrackedFrame {
     /// Header stamp of the image since the start of the log.
     pub stamp_ns: i64,
     pub features: Vec<TrackedFeature>,
+    /// Observations of some of the features in the image of the other camera of a stereo pair at the same moment, ordered by
+    /// id; empty without one.
+    pub matched: Vec<TrackedFeature>,
     pub statistics: FrontEndStatistics,
 }

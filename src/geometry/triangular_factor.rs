@@ -416,8 +416,9 @@ pub(crate) fn triangularize(matrix: &DMatrix<f64>) -> DMatrix<f64> {
     factor.into_matrix()
 }
 
-/// A column depends on the previous ones when no more than this fraction of it is independent.
-const DEPENDENT: f64 = 1e-9;
+/// A column depends on the previous ones when no more than this fraction of it is independent: its information, the square,
+/// is then at most the rounding error of normal equations.
+const DEPENDENT: f64 = 1e-8;
 
 /// Row echelon form of `[A | b]`: orthogonal rows, without those that are zero in `A`.
 pub(crate) struct Echelon {

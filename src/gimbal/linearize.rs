@@ -6,7 +6,7 @@
 
 use nalgebra::{Matrix6xX, Vector3};
 
-use crate::geometry::RigidTransform;
+use crate::geometry::{RigidTransform, so3};
 
 use super::form::Form;
 use super::frame::{Axis, ChainFrame};
@@ -21,6 +21,38 @@ pub struct ChainLinearization {
     pub by_parameters: Matrix6xX<f64>,
     /// Derivative of `[φ; δt]` of `imu_from_camera` with respect to the joint angles (6 × N).
     pub by_joints: Matrix6xX<f64>,
+}
+
+impl ChainLinearization {
+    /// The same for a camera mounted on this one; its chain has no joints, and its columns follow at `column` in `columns`
+    /// columns.
+    ///
+    /// ```text
+    /// T = T₁ T₂    φ = R₂ᵀ φ₁ + φ₂    δt = δt₁ − R₁ [t₂]× φ₁ + R₁ δt₂
+    /// ```
+    #[must_use]
+    pub fn followed_by(&self, mounted: &Self, column: usize, columns: usize) -> Self {
+        let (first, second) = (self.imu_from_camera.rotation_matrix(), mounted.imu_from_camera.rotation_matrix());
+        let lever = first * so3::hat(&mounted.imu_from_camera.translation_m);
+        let carried = |by: &Matrix6xX<f64>| {
+            let mut carried = by.clone();
+            carried.fixed_rows_mut::<3>(0).copy_from(&second.tr_mul(&by.fixed_rows::<3>(0)));
+            carried.fixed_rows_mut::<3>(3).copy_from(&(by.fixed_rows::<3>(3) - lever * by.fixed_rows::<3>(0)));
+            carried
+        };
+        let mut by_parameters = carried(&self.by_parameters).resize_horizontally(columns, 0.0);
+        // A fixed calibration has no columns.
+        if columns > 0 {
+            let mut own = by_parameters.columns_mut(column, mounted.by_parameters.ncols());
+            own.fixed_rows_mut::<3>(0).copy_from(&mounted.by_parameters.fixed_rows::<3>(0));
+            own.fixed_rows_mut::<3>(3).copy_from(&(first * mounted.by_parameters.fixed_rows::<3>(3)));
+        }
+        Self {
+            imu_from_camera: self.imu_from_camera * mounted.imu_from_camera,
+            by_parameters,
+            by_joints: carried(&self.by_joints),
+        }
+    }
 }
 
 impl Chain {

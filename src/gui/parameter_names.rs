@@ -14,8 +14,8 @@ pub(crate) enum CalibrationPart {
     Link(usize),
     /// Between the last joint and the camera.
     End,
-    /// The extrinsics of a second, rigid camera.
-    Rigid,
+    /// The extrinsics of a rigid camera besides the main one, by its number.
+    Rigid(u8),
     /// The intrinsics of a camera by its number.
     Camera(u8),
     Gyroscope,
@@ -40,7 +40,7 @@ pub(crate) fn part_of(parameter: ParameterId) -> CalibrationPart {
         (_, ParameterPart::GimbalImu) => CalibrationPart::GimbalImu,
         (_, ParameterPart::ImuFromBase | ParameterPart::Base) => CalibrationPart::Base,
         (_, ParameterPart::Link(link)) => CalibrationPart::Link(usize::from(link) + 1),
-        (_, part) if part.camera() > 0 => CalibrationPart::Rigid,
+        (_, ParameterPart::ImuFromCamera(camera)) if camera > 0 => CalibrationPart::Rigid(camera),
         _ => CalibrationPart::End,
     }
 }
@@ -50,7 +50,11 @@ pub(crate) fn heading_of(part: CalibrationPart, rig: &Rig) -> String {
         CalibrationPart::Base => "base".to_owned(),
         CalibrationPart::Link(number) => joint_name(number, rig).unwrap_or("link").to_owned(),
         CalibrationPart::End | CalibrationPart::Camera(0) => "camera".to_owned(),
-        CalibrationPart::Rigid => "rigid".to_owned(),
+        CalibrationPart::Rigid(camera) => {
+            let names = rig.parameter_names();
+            let several = names.cameras.len() > 1;
+            if several { names.part(ParameterPart::ImuFromCamera(camera)) } else { "rigid".to_owned() }
+        }
         CalibrationPart::Camera(camera) => rig.parameter_names().part(ParameterPart::Camera(camera)),
         CalibrationPart::Gyroscope => "gyro".to_owned(),
         CalibrationPart::Accelerometer => "accel".to_owned(),
@@ -109,7 +113,7 @@ pub(crate) fn meaning_of(parameter: ParameterId, rig: &Rig) -> String {
             None => format!("link {number}"),
         },
         (_, ParameterPart::EffectorFromCamera) => "end effector to camera".to_owned(),
-        (CalibrationPart::Rigid, part) => format!("IMU to rigid {}", names.part(part)),
+        (CalibrationPart::Rigid(_), part) => format!("IMU to rigid {}", names.part(part)),
         _ => "end of the chain".to_owned(),
     };
     format!("{kind} ({place})")

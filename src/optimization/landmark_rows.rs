@@ -90,11 +90,6 @@ impl LandmarkRows {
         self.added.push(AddedRows { rows: height - OBSERVATION_ROWS..height, blocks: self.blocks.len() });
     }
 
-    /// Last block of the newest observation, `None` if only the anchor has been added.
-    pub(crate) fn last_observer(&self) -> Option<usize> {
-        self.blocks[self.common..].last().copied()
-    }
-
     pub(crate) fn eliminate(&mut self) {
         Arch::new().dispatch(Elimination(self));
     }

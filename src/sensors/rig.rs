@@ -72,6 +72,12 @@ pub struct CameraRig {
     /// Key in the rig file, `cam0`, `cam1`, ….
     pub key: String,
     pub mount: CameraMount,
+    /// Pose in the frame of the first camera on the gimbal; the identity for that one and for rigid cameras.
+    pub first_from_camera: RigidTransform,
+    /// Prior of the pose relative to the camera before it with the same mount (Kalibr's `T_cn_cnm1`), which is known better
+    /// than the pose of either relative to the IMU: of a stereo pair, or of cameras on one gimbal. `None` if the pose is
+    /// only known relative to the IMU.
+    pub relative_prior: Option<ChainPrior>,
     pub topic: String,
     /// True if the log times of the images replace their header stamps, which were never set.
     pub use_log_time: bool,
@@ -103,6 +109,10 @@ pub struct IntrinsicsSigma {
 }
 
 impl CameraRig {
+    pub fn is_on_gimbal(&self) -> bool {
+        self.mount == CameraMount::Gimbal
+    }
+
     /// Time in seconds from an image's stamp to the exposure of a row (0 is the centre of the first one), in camera
     /// time: `row / height · readout`.
     pub fn row_time_s(&self, row_px: f64) -> f64 {
@@ -129,6 +139,9 @@ pub struct ChainPrior {
 }
 
 impl ChainPrior {
+    /// Prior on the pose of a camera relative to the one before it: both were calibrated with the same images.
+    pub const RELATIVE: Self = Self { translation_bound_m: 0.001, rotation_bound_rad: 0.00175 };
+
     /// Prior on a rigid camera's extrinsics if the rig has none: calibrations with a target are better than this.
     const RIGID_CAMERA: Self = Self { translation_bound_m: 0.01, rotation_bound_rad: 0.0175 };
 
@@ -139,6 +152,9 @@ impl ChainPrior {
         (self.translation_bound_m * SIGMA_PER_BOUND, self.rotation_bound_rad * SIGMA_PER_BOUND)
     }
 }
+
+/// Smallest ratio of the image of a camera in the field of view of another one for a stereo pair.
+const MIN_COMMON_FIELD: f64 = 0.25;
 
 /// Name and range of a joint.
 #[derive(Clone, Debug, PartialEq)]
@@ -254,10 +270,30 @@ impl Rig {
         self.gimbal.iter().flat_map(|gimbal| &gimbal.joints).map(|joint| joint.name.clone()).collect()
     }
 
-    /// Names of calibration parameters: links by their joints, further rigid cameras by their keys.
+    /// Names of calibration parameters: links by their joints, all cameras but the [first](Self::first_camera) by their
+    /// keys.
     pub fn parameter_names(&self) -> ParameterNames {
-        let rigid = self.cameras.iter().filter(|camera| camera.mount != CameraMount::Gimbal);
-        ParameterNames { joints: self.joint_names(), cameras: rigid.map(|camera| camera.key.clone()).collect() }
+        let further = self.further_cameras().map(|camera| camera.key.clone());
+        ParameterNames { joints: self.joint_names(), cameras: further.collect() }
+    }
+
+    /// Camera that a run uses unless it names another one: the first one on the gimbal, else the first one.
+    pub fn first_camera(&self) -> Option<&CameraRig> {
+        let on_gimbal = self.cameras.iter().find(|camera| camera.mount == CameraMount::Gimbal);
+        on_gimbal.or_else(|| self.cameras.first())
+    }
+
+    /// Number of a camera in the names of parameters: 0 for the [first](Self::first_camera) one, which is also the number
+    /// of an unknown camera; the others are counted in their order.
+    pub fn camera_number(&self, key: &str) -> u8 {
+        let place = self.further_cameras().position(|camera| camera.key == key);
+        place.and_then(|place| u8::try_from(place + 1).ok()).unwrap_or_default()
+    }
+
+    /// All cameras but the [first](Self::first_camera) one.
+    fn further_cameras(&self) -> impl Iterator<Item = &CameraRig> {
+        let first = self.first_camera().map(|camera| camera.key.as_str());
+        self.cameras.iter().filter(move |camera| Some(camera.key.as_str()) != first)
     }
 
     /// Chain of the camera with a key: the gimbal's, or one without links for a rigid camera. `None` for an
@@ -265,10 +301,79 @@ impl Rig {
     pub fn chain_of_camera(&self, key: &str) -> Option<ClassicalChain> {
         let camera = self.cameras.iter().find(|camera| camera.key == key)?;
         match &camera.mount {
-            CameraMount::Gimbal => self.gimbal.as_ref().map(|gimbal| gimbal.chain.clone()),
+            CameraMount::Gimbal => self.gimbal.as_ref().map(|gimbal| {
+                let chain = &gimbal.chain;
+                // The chain ends at the first camera.
+                if camera.relative_prior.is_some() {
+                    let effector_from_camera = chain.effector_from_camera * camera.first_from_camera;
+                    ClassicalChain { effector_from_camera, ..chain.clone() }
+                } else {
+                    chain.clone()
+                }
+            }),
             CameraMount::Static { imu_from_camera } => {
                 Some(ClassicalChain { imu_from_base: *imu_from_camera, ..ClassicalChain::default() })
             }
+        }
+    }
+
+    /// Nearest camera before another one with the same mount.
+    pub fn camera_before(&self, camera: &CameraRig) -> Option<&CameraRig> {
+        let before = self.cameras.iter().take_while(|other| other.key != camera.key);
+        before.filter(|other| other.is_on_gimbal() == camera.is_on_gimbal()).last()
+    }
+
+    /// Camera relative to which the pose of another one is known: the nearest one before it with the same mount whose pose
+    /// is known relative to the IMU. `None` if the pose of `camera` itself is.
+    pub fn base_of(&self, camera: &CameraRig) -> Option<&CameraRig> {
+        camera.relative_prior?;
+        let before = self.cameras.iter().take_while(|other| other.key != camera.key);
+        before.filter(|other| other.relative_prior.is_none() && other.is_on_gimbal() == camera.is_on_gimbal()).last()
+    }
+
+    /// Other camera of the stereo pair of a rigid camera: the first one mounted beside it that sees a part of its field of
+    /// view.
+    pub fn stereo_partner(&self, camera: &CameraRig) -> Option<&CameraRig> {
+        let is_beside = |other: &&CameraRig| self.base_of(other).is_some_and(|base| base.key == camera.key);
+        let is_seen = |other: &&CameraRig| {
+            let here_from_camera = self.base_from_camera(Some(&camera.key), &other.key).map(|pose| pose.inverse());
+            here_from_camera
+                .is_some_and(|pose| other.model.common_field(&camera.model, &pose.rotation) >= MIN_COMMON_FIELD)
+        };
+        self.cameras.iter().filter(|other| !camera.is_on_gimbal() && is_beside(other)).find(is_seen)
+    }
+
+    /// Pose of a camera in the frame of another one, or of the IMU without one. `None` for an unknown key, for cameras with
+    /// different mounts, and for a camera on the gimbal without another one.
+    pub fn base_from_camera(&self, base: Option<&str>, key: &str) -> Option<RigidTransform> {
+        let camera = self.camera(key).ok()?;
+        let base = base.map(|base| self.camera(base)).transpose().ok()?;
+        match (base, &camera.mount) {
+            (None, CameraMount::Gimbal) => None,
+            (None, CameraMount::Static { imu_from_camera }) => Some(*imu_from_camera),
+            (Some(base), CameraMount::Gimbal) => {
+                base.is_on_gimbal().then(|| base.first_from_camera.inverse() * camera.first_from_camera)
+            }
+            (Some(base), CameraMount::Static { imu_from_camera }) => match &base.mount {
+                CameraMount::Static { imu_from_camera: imu_from_base } => {
+                    Some(imu_from_base.inverse() * *imu_from_camera)
+                }
+                CameraMount::Gimbal => None,
+            },
+        }
+    }
+
+    /// Sets the pose of a camera in the frame of another one, or of the IMU without one; see [`Self::base_from_camera`].
+    pub fn set_base_from_camera(&mut self, base: Option<&str>, key: &str, base_from_camera: RigidTransform) {
+        let base = base.and_then(|base| self.camera(base).ok());
+        let imu_from_base = base.map_or_else(RigidTransform::identity, |base| match &base.mount {
+            CameraMount::Static { imu_from_camera } => *imu_from_camera,
+            CameraMount::Gimbal => base.first_from_camera,
+        });
+        let Some(camera) = self.cameras.iter_mut().find(|camera| camera.key == key) else { return };
+        match &mut camera.mount {
+            CameraMount::Static { imu_from_camera } => *imu_from_camera = imu_from_base * base_from_camera,
+            CameraMount::Gimbal => camera.first_from_camera = imu_from_base * base_from_camera,
         }
     }
 
@@ -343,7 +448,12 @@ impl Rig {
         }
         let imu_from_camera = gimbal.chain.imu_from_camera(angles_rad);
         for camera in rig.cameras.iter_mut().filter(|camera| camera.mount == CameraMount::Gimbal) {
+            let imu_from_camera = match camera.relative_prior {
+                None => imu_from_camera,
+                Some(_) => imu_from_camera * camera.first_from_camera,
+            };
             camera.mount = CameraMount::Static { imu_from_camera };
+            camera.first_from_camera = RigidTransform::identity();
         }
         rig.assumed.retain(|assumed| !assumed.field.starts_with("gimbal"));
         Some(rig)

@@ -38,13 +38,23 @@ impl Named for Lens {
     const NAMES: &'static [(Self, &'static str)] = &[(Self::Pinhole, "pinhole"), (Self::Radtan, "radtan")];
 }
 
-/// Camera model at this image size; `which` is 0 for the gimbal camera, 1 for the static one.
+/// Focal lengths and principal points at [`NOMINAL_SIZE_PX`], by camera: on the gimbal, static, the right one of a stereo
+/// pair, thermal.
+const INTRINSICS_PX: [[f64; 4]; 4] = [
+    [361.4, 360.9, 318.6, 241.8],
+    [357.8, 358.3, 322.7, 237.4],
+    [359.3, 359.6, 317.9, 243.2],
+    [527.4, 527.9, 321.2, 238.7],
+];
+
+/// Camera model at this image size; `which` is the index in [`INTRINSICS_PX`].
 pub(crate) fn camera_model(which: usize, lens: Lens, resolution_px: [usize; 2]) -> CameraModel {
-    let [fx, fy, cx, cy] = [[361.4, 360.9, 318.6, 241.8], [357.8, 358.3, 322.7, 237.4]][which.min(1)];
+    let [fx, fy, cx, cy] = INTRINSICS_PX[which];
     let distortion = match (lens, which) {
         (Lens::Pinhole, _) => Distortion::None,
         (Lens::Radtan, 0) => Distortion::Radtan([-0.112, 0.028, 0.0005, -0.0003]),
-        (Lens::Radtan, _) => Distortion::Radtan([-0.124, 0.034, -0.0004, 0.0006]),
+        (Lens::Radtan, 1) => Distortion::Radtan([-0.124, 0.034, -0.0004, 0.0006]),
+        (Lens::Radtan, _) => Distortion::Radtan([-0.118, 0.031, 0.0003, 0.0002]),
     };
     let scale = |axis: usize| resolution_px[axis] as f64 / NOMINAL_SIZE_PX[axis] as f64;
     // Pixel centres lie at integers, so the image's corner lies at −0.5.
@@ -62,6 +72,10 @@ pub(crate) fn camera_model(which: usize, lens: Lens, resolution_px: [usize; 2]) 
 pub(crate) struct Equipment {
     pub(crate) gimbal_camera: bool,
     pub(crate) static_camera: bool,
+    /// Distance of a second static camera to the right of the static one, in metres; `None` without one.
+    pub(crate) stereo_baseline_m: Option<f64>,
+    /// True for a second camera on the gimbal.
+    pub(crate) second_gimbal_camera: bool,
     pub(crate) lens: Lens,
     pub(crate) resolution_px: [usize; 2],
     pub(crate) camera_rate_hz: f64,
@@ -77,21 +91,33 @@ impl Equipment {
     /// True rig; the manufacturing errors of its chain are drawn from a random stream.
     pub(crate) fn true_rig(&self, name: &str, random: &mut RandomStream) -> Rig {
         let chain = true_chain(random);
-        let static_extrinsics = CameraMount::Static { imu_from_camera: static_extrinsics(random) };
+        let static_extrinsics = static_extrinsics(random);
+        let right = self.stereo_baseline_m.map(|baseline_m| beside(Vector3::x() * baseline_m, random));
+        let thermal = self.second_gimbal_camera.then(|| beside(Vector3::new(0.0, 0.06, 0.004), random));
         let mut cameras = Vec::new();
+        let of_imu = |imu_from_camera: RigidTransform| CameraMount::Static { imu_from_camera };
         let kinds = [
-            (self.gimbal_camera, "gimbal_camera", CameraMount::Gimbal, self.camera_rate_hz),
-            (self.static_camera, "static_camera", static_extrinsics, self.static_camera_rate_hz),
+            (self.gimbal_camera, "gimbal_camera", CameraMount::Gimbal, None),
+            (self.static_camera, "static_camera", of_imu(static_extrinsics), None),
+            (self.static_camera && right.is_some(), "static_camera_right", of_imu(static_extrinsics), right),
+            (self.gimbal_camera && thermal.is_some(), "thermal_camera", CameraMount::Gimbal, thermal),
         ];
-        for (which, (wanted, camera, mount, rate_hz)) in kinds.into_iter().enumerate() {
+        for (which, (wanted, camera, mount, beside)) in kinds.into_iter().enumerate() {
+            let relative = beside.unwrap_or_else(RigidTransform::identity);
             if wanted {
+                let on_gimbal = mount == CameraMount::Gimbal;
                 cameras.push(CameraRig {
                     key: format!("cam{}", cameras.len()),
-                    mount,
+                    first_from_camera: if on_gimbal { relative } else { RigidTransform::identity() },
+                    relative_prior: beside.map(|_| ChainPrior::RELATIVE),
+                    mount: match mount {
+                        CameraMount::Static { imu_from_camera } => of_imu(imu_from_camera * relative),
+                        CameraMount::Gimbal => CameraMount::Gimbal,
+                    },
                     topic: format!("/{camera}/image_raw/compressed"),
                     use_log_time: false,
                     frame_id: camera.to_owned(),
-                    rate_hz,
+                    rate_hz: if on_gimbal { self.camera_rate_hz } else { self.static_camera_rate_hz },
                     model: camera_model(which, self.lens, self.resolution_px),
                     timeshift_cam_imu_s: self.camera_time_offset_s,
                     readout_s: self.readout_s,
@@ -168,10 +194,15 @@ fn static_extrinsics(random: &mut RandomStream) -> RigidTransform {
     RigidTransform::new(down * optical * so3::exp(&tilt), Vector3::new(0.105, 0.003, 0.022) + shift)
 }
 
+/// Pose of a camera `offset_m` beside another one in the frame of that one, with random errors of half a degree.
+fn beside(offset_m: Vector3<f64>, random: &mut RandomStream) -> RigidTransform {
+    RigidTransform::new(so3::exp(&random.normal_vector(0.005)), offset_m + random.normal_vector(0.0005))
+}
+
 /// Rig given to an estimator: each of the chain's `4N + 6` independent parameters (the parameters of the minimal
 /// parameterization) has a uniform error within `bounds`, as at the start of the paper's experiments; static cameras
-/// have errors within the same bounds, but of at most 3 mm and 0.5° per axis. The cameras' time offset and readout are
-/// absent.
+/// have errors within the same bounds, but of at most 3 mm and 0.5° per axis. A camera beside another one has errors within
+/// its prior relative to that one. The cameras' time offset and readout are absent.
 pub(crate) fn given_rig(ground_truth: &Rig, bounds: ChainPrior, random: &mut RandomStream) -> Rig {
     let mut given = ground_truth.clone();
     if let Some(gimbal) = &mut given.gimbal {
@@ -183,11 +214,25 @@ pub(crate) fn given_rig(ground_truth: &Rig, bounds: ChainPrior, random: &mut Ran
     for camera in &mut given.cameras {
         camera.timeshift_cam_imu_s = 0.0;
         camera.readout_s = 0.0;
+        if camera.relative_prior.is_some() {
+            continue;
+        }
         if let CameraMount::Static { imu_from_camera } = &mut camera.mount {
             let phi = Vector3::from_fn(|_, _| random.uniform(-rotation_bound, rotation_bound));
             imu_from_camera.rotation *= so3::exp(&phi);
             imu_from_camera.translation_m += Vector3::from_fn(|_, _| random.uniform(-shift, shift));
         }
+    }
+    for camera in &ground_truth.cameras {
+        let (Some(prior), Some(base)) = (camera.relative_prior, ground_truth.base_of(camera)) else { continue };
+        let Some(mut pose) = ground_truth.base_from_camera(Some(&base.key), &camera.key) else { continue };
+        let [rotation_bound, shift] = [bounds.rotation_bound_rad, bounds.translation_bound_m];
+        let (rotation_bound, shift) =
+            (rotation_bound.min(prior.rotation_bound_rad), shift.min(prior.translation_bound_m));
+        let phi = Vector3::from_fn(|_, _| random.uniform(-rotation_bound, rotation_bound));
+        pose.rotation *= so3::exp(&phi);
+        pose.translation_m += Vector3::from_fn(|_, _| random.uniform(-shift, shift));
+        given.set_base_from_camera(Some(&base.key), &camera.key, pose);
     }
     given
 }

@@ -40,6 +40,10 @@ pub struct SimulationOptions {
     pub static_camera_phase_s: f64,
     /// True if the static camera is also recorded.
     pub static_camera: bool,
+    /// Distance of a second static camera to the right of the static one in metres, a stereo pair; `None` without one.
+    pub stereo_baseline_m: Option<f64>,
+    /// True if a second, thermal camera with a longer focal length is on the gimbal.
+    pub second_gimbal_camera: bool,
     /// Standard deviation of the image noise, in grey values.
     pub image_noise: f64,
     /// Quality of the JPEG images, 1 to 100.
@@ -71,6 +75,8 @@ impl SimulationOptions {
             static_camera_rate_hz: None,
             static_camera_phase_s: 0.0,
             static_camera: true,
+            stereo_baseline_m: None,
+            second_gimbal_camera: false,
             image_noise: 2.0,
             jpeg_quality: 85,
             disturbances: Disturbances::default(),
@@ -121,6 +127,9 @@ impl SimulationOptions {
             within("rate of the static camera in Hz", rate_hz, 0.1, 200.0)?;
         }
         within("phase of the static camera in seconds", self.static_camera_phase_s, 0.0, 10.0)?;
+        if let Some(baseline_m) = self.stereo_baseline_m {
+            within("baseline of the stereo pair in metres", baseline_m, 0.01, 2.0)?;
+        }
         within("image noise in grey values", self.image_noise, 0.0, 100.0)?;
         within("JPEG quality", f64::from(self.jpeg_quality), 1.0, 100.0)?;
         self.disturbances.check()

@@ -216,6 +216,8 @@ fn true_rig(options: &SimulationOptions, name: &str) -> Result<Rig, SimulationEr
     let equipment = Equipment {
         gimbal_camera: true,
         static_camera: options.static_camera,
+        stereo_baseline_m: options.stereo_baseline_m,
+        second_gimbal_camera: options.second_gimbal_camera,
         lens: options.lens,
         resolution_px: options.resolution_px,
         camera_rate_hz: options.camera_rate_hz,

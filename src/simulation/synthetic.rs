@@ -58,6 +58,9 @@ pub struct SyntheticOptions {
     pub features: usize,
     /// Factor of noise, bias random walk and turn-on bias of the IMU; 0 makes it ideal.
     pub imu_noise_scale: f64,
+    /// True for a camera beside the one of `mount`, `cam1` of the rigs: the right one of a stereo pair, or a second one on the
+    /// gimbal.
+    pub beside: bool,
     /// Standard deviation of the encoders; `None` without encoders.
     pub encoder_sigma_rad: Option<f64>,
     /// True for an IMU on the gimbal, with the noise scale of the vehicle's.
@@ -96,6 +99,7 @@ impl Default for SyntheticOptions {
             outlier_ratio: 0.0,
             features: 150,
             imu_noise_scale: 1.0,
+            beside: false,
             encoder_sigma_rad: Some(0.5_f64.to_radians()),
             gimbal_imu: false,
             clock_offsets_s: [0.0; 2],
@@ -158,13 +162,15 @@ impl SyntheticFrame {
 pub struct SyntheticFlight {
     /// Frames in time order.
     pub frames: Vec<SyntheticFrame>,
-    /// Rig given to the estimator; its only camera is `cam0`.
+    /// Rig given to the estimator; its camera is `cam0`, or `cam1` with [`SyntheticOptions::beside`].
     pub given_rig: Rig,
     pub true_rig: Rig,
     /// True positions of the tracked landmarks.
     pub landmarks: BTreeMap<FeatureId, Vector3<f64>>,
 }
 
+/// Baseline of a stereo pair.
+const STEREO_BASELINE_M: f64 = 0.12;
 /// Stamp of the first frame.
 const FIRST_FRAME_S: f64 = 0.003;
 /// Half the interval of the central difference that gives the rate of a joint.
@@ -176,6 +182,8 @@ pub fn synthetic_tracks(options: &SyntheticOptions) -> SyntheticFlight {
     let equipment = Equipment {
         gimbal_camera: gimbal,
         static_camera: !gimbal,
+        stereo_baseline_m: options.beside.then_some(STEREO_BASELINE_M),
+        second_gimbal_camera: options.beside,
         lens: options.lens,
         resolution_px: [640, 480],
         camera_rate_hz: options.frame_rate_hz,
@@ -210,9 +218,10 @@ pub fn synthetic_tracks(options: &SyntheticOptions) -> SyntheticFlight {
     scenario.measure_gimbal_imu(options.imu_noise_scale);
     spoil(&mut scenario, options);
     let gimbal_imu = scenario.gimbal_imu_record.as_ref();
-    let camera = &scenario.true_rig.cameras[0];
+    let index = usize::from(options.beside);
+    let camera = &scenario.true_rig.cameras[index];
     let mut encoders = RandomStream::new(options.seed, stream::ENCODERS);
-    let mut tracker = Tracker::new(camera.model.clone(), scenario.given_rig.cameras[0].model.clone(), options);
+    let mut tracker = Tracker::new(camera.model.clone(), scenario.given_rig.cameras[index].model.clone(), options);
     let first_s = FIRST_FRAME_S + options.phase_s;
     let count = ((options.duration_s - first_s) * options.frame_rate_hz).floor().max(0.0) as usize + 1;
     let mut frames = Vec::with_capacity(count);
@@ -362,7 +371,7 @@ impl Tracker {
         self.find(world_from_camera, &mut features);
         statistics.detected = features.len() - tracked;
         self.before = Some(first_row);
-        TrackedFrame { stamp_ns, features, statistics }
+        TrackedFrame { stamp_ns, features, matched: Vec::new(), statistics }
     }
 
     fn noisy(&mut self, uv_px: Vector2<f64>) -> Vector2<f64> {

@@ -17,6 +17,9 @@ pub enum EncoderNoise {
     Degrees(f64),
 }
 
+/// Name of the second camera on the gimbal.
+const SECOND_GIMBAL_CAMERA: &str = "thermal";
+
 /// A simulated flight, without its seed and the disturbances of the plan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FlightRecipe {
@@ -41,6 +44,19 @@ pub struct FlightRecipe {
     pub rate_hz: f64,
     /// True if the static camera is recorded as well.
     pub static_camera: bool,
+    /// Frame rate of the static camera, `None` for `rate_hz`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub static_camera_rate_hz: Option<f64>,
+    /// Time by which the static camera exposes its images later than the gimbal camera, `None` for cameras that are triggered
+    /// together.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub static_camera_phase_s: Option<f64>,
+    /// Distance of a second static camera to the right of the static one, `None` without one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stereo_baseline_m: Option<f64>,
+    /// Second camera on the gimbal: `thermal`; `None` without one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gimbal_camera: Option<String>,
     /// Factor of the noise of an IMU that moves with the gimbal camera, `None` without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gimbal_imu_noise_scale: Option<f64>,
@@ -73,6 +89,9 @@ impl FlightRecipe {
             && environment != experiment.environment()
         {
             return Err(("world", SimulationError::WrongWorld { world, experiment }.to_string()));
+        }
+        if let Some(found) = self.gimbal_camera.as_deref().filter(|kind| *kind != SECOND_GIMBAL_CAMERA) {
+            return Err(("gimbal_camera", format!("is '{found}', expected {SECOND_GIMBAL_CAMERA}")));
         }
         let options = self.options(1, &[]).map_err(|error| ("disturb", error.to_string()))?;
         options.check().map_err(|error| ("disturb", error.to_string()))
@@ -115,6 +134,10 @@ impl FlightRecipe {
         options.resolution_px = self.size_px;
         options.camera_rate_hz = self.rate_hz;
         options.static_camera = self.static_camera;
+        options.static_camera_rate_hz = self.static_camera_rate_hz;
+        options.static_camera_phase_s = self.static_camera_phase_s.unwrap_or(0.0);
+        options.stereo_baseline_m = self.stereo_baseline_m;
+        options.second_gimbal_camera = self.gimbal_camera.is_some();
         options.gimbal_imu_noise_scale = self.gimbal_imu_noise_scale;
         for text in self.disturb.iter().chain(disturb) {
             options.disturbances.set(text)?;

@@ -1,5 +1,6 @@
 //! Integration tests, one module per feature.
 
+mod cameras;
 mod check;
 mod command_line;
 mod convert;

@@ -201,7 +201,7 @@ fn measure(
             gimbal_imu: &[],
             joint_angles: view.joint_angles.as_ref(),
             tracks: &view.tracks,
-            rigid_tracks: &[],
+            further_tracks: &[],
         });
         innovations.take(&report);
     }

@@ -15,6 +15,8 @@ use crate::sensors::{
 
 #[derive(Clone, Debug)]
 pub struct EstimatorConfig {
+    /// Key of the main camera in the rig.
+    pub key: String,
     pub camera: CameraModel,
     pub imu_noise: ImuNoise,
     pub gravity_m_per_s2: f64,
@@ -50,8 +52,8 @@ pub struct EstimatorConfig {
     pub sensor: CameraSensorPrior,
     /// Given time offset of the main camera, in seconds (`t_imu = t_cam + shift`); stamps already include it.
     pub timeshift_s: f64,
-    /// Rigid cameras in addition to the main one.
-    pub rigid_cameras: Vec<RigidCamera>,
+    /// Cameras in addition to the main one.
+    pub further_cameras: Vec<FurtherCamera>,
     /// Camera at whose images the frames lie, the main one first, where images of other cameras are exposed between them;
     /// `None` if all images of a step have one stamp.
     pub frame_camera: Option<usize>,
@@ -65,15 +67,22 @@ pub struct EstimatorConfig {
     pub clock_ms: fn() -> f64,
 }
 
-/// Rigid camera in addition to the main one.
+/// Camera in addition to the main one, rigidly mounted on the IMU or on another camera of the run.
 #[derive(Clone, Debug)]
-pub struct RigidCamera {
+pub struct FurtherCamera {
     /// Key of the camera in the rig, used in parameter names: `cam1`.
     pub key: String,
+    /// [`Rig::camera_number`], which its parameters have.
+    pub number: u8,
     pub model: CameraModel,
-    /// Extrinsics of the rig, `imu_from_camera`.
-    pub imu_from_camera: RigidTransform,
-    /// Prior standard deviations of the extrinsics, in metres and radians.
+    /// Camera that it is mounted on, by its index in the run: the main one on a gimbal, the first one of a stereo pair.
+    /// `None` for a rigid camera whose pose is known relative to the IMU.
+    pub base: Option<usize>,
+    /// Pose of the rig relative to its base, else to the IMU.
+    pub base_from_camera: RigidTransform,
+    /// True if features of its base are matched in its images: a stereo pair.
+    pub is_matched: bool,
+    /// Prior standard deviations of that pose, in metres and radians.
     pub prior: (f64, f64),
     /// Given time offset, in seconds.
     pub timeshift_s: f64,
@@ -103,11 +112,11 @@ impl CameraSensorPrior {
     }
 }
 
-/// Parameters and values of the six extrinsics columns of rigid camera `camera`: rotation vector and translation of
-/// `imu_from_camera`.
-pub fn rigid_columns(camera: u8, imu_from_camera: &RigidTransform) -> Vec<(ParameterId, f64)> {
-    let chain = Chain::from_classical(&rigid_chain(imu_from_camera), Parameterization::Minimal);
-    let parameters = chain.parameters().into_iter().map(|parameter| parameter.of_camera(camera));
+/// Parameters and values of the six extrinsics columns of a further camera with this number: rotation vector and
+/// translation of its pose.
+pub fn pose_columns(number: u8, base_from_camera: &RigidTransform) -> Vec<(ParameterId, f64)> {
+    let chain = Chain::from_classical(&rigid_chain(base_from_camera), Parameterization::Minimal);
+    let parameters = chain.parameters().into_iter().map(|parameter| parameter.of_camera(number));
     parameters.zip(chain.values().iter().copied()).collect()
 }
 
@@ -123,23 +132,34 @@ pub fn imu_intrinsics(columns: &[(ParameterId, f64)]) -> ImuIntrinsics {
     imu_errors::intrinsics(&values)
 }
 
-/// Chain without joints: the extrinsics of a rigid camera.
-pub(crate) fn rigid_chain(imu_from_camera: &RigidTransform) -> ClassicalChain {
-    ClassicalChain { imu_from_base: *imu_from_camera, ..ClassicalChain::default() }
+/// Chain without joints: the pose of a camera that is mounted rigidly.
+pub(crate) fn rigid_chain(base_from_camera: &RigidTransform) -> ClassicalChain {
+    ClassicalChain { imu_from_base: *base_from_camera, ..ClassicalChain::default() }
 }
 
 /// Default standard deviations of a calibration of unstated accuracy: 5 mm and 0.5°.
 pub const DEFAULT_CHAIN_PRIOR: (f64, f64) = (0.005, 0.0087);
 
-impl RigidCamera {
-    /// Rigid camera of a rig; `None` for a camera on the gimbal.
-    pub fn of_rig(rig: &Rig, camera: &CameraRig) -> Option<Self> {
-        let CameraMount::Static { imu_from_camera } = &camera.mount else { return None };
+impl FurtherCamera {
+    /// Camera of a run with the `others` before it, the main one first; `None` for a camera on a gimbal without another one
+    /// of that gimbal in the run.
+    pub fn of_rig(rig: &Rig, others: &[&CameraRig], camera: &CameraRig) -> Option<Self> {
+        let of_base = |one: &CameraRig| rig.base_of(one).map_or_else(|| one.key.clone(), |base| base.key.clone());
+        let is_beside = |other: &&&CameraRig| other.is_on_gimbal() == camera.is_on_gimbal();
+        let base = camera.relative_prior.and_then(|prior| {
+            let other = others.iter().position(|other| is_beside(&other) && of_base(other) == of_base(camera));
+            Some((other?, prior))
+        });
+        let (base, prior) = base.unzip();
         Some(Self {
             key: camera.key.clone(),
+            number: rig.camera_number(&camera.key),
             model: camera.model.clone(),
-            imu_from_camera: *imu_from_camera,
-            prior: rig.extrinsics_prior(camera).sigmas(),
+            base,
+            base_from_camera: rig.base_from_camera(base.map(|base| others[base].key.as_str()), &camera.key)?,
+            is_matched: base
+                .is_some_and(|base| rig.stereo_partner(others[base]).is_some_and(|partner| partner.key == camera.key)),
+            prior: prior.unwrap_or_else(|| rig.extrinsics_prior(camera)).sigmas(),
             timeshift_s: camera.timeshift_cam_imu_s,
             sensor: CameraSensorPrior::of_rig(camera),
         })
@@ -159,6 +179,7 @@ impl EstimatorConfig {
         // Without a topic there are no readings, even if their noise is given.
         let encoder_sigma_rad = gimbal.filter(|gimbal| gimbal.topic.is_some()).and_then(|it| it.encoder_sigma_rad);
         Ok(Self {
+            key: camera.key.clone(),
             camera: camera.model.clone(),
             imu_noise: rig.imu.noise,
             gravity_m_per_s2: rig.gravity_m_per_s2,
@@ -174,11 +195,12 @@ impl EstimatorConfig {
             estimate_intrinsics: false,
             estimate_imu_intrinsics: false,
             imu_intrinsics: rig.imu.intrinsics,
-            gimbal_imu: gimbal.and_then(|_| rig.gimbal_imu.clone()),
+            // Its pose is relative to the first camera on the gimbal.
+            gimbal_imu: gimbal.filter(|_| camera.relative_prior.is_none()).and_then(|_| rig.gimbal_imu.clone()),
             estimate_gimbal_imu: false,
             sensor: CameraSensorPrior::of_rig(camera),
             timeshift_s: camera.timeshift_cam_imu_s,
-            rigid_cameras: Vec::new(),
+            further_cameras: Vec::new(),
             frame_camera: None,
             calibration_prior: None,
             earlier_pass: None,
@@ -189,18 +211,28 @@ impl EstimatorConfig {
 
     /// Model of a camera by its number, the main one first.
     pub(crate) fn model(&self, camera: usize) -> &CameraModel {
-        camera.checked_sub(1).map_or(&self.camera, |rigid| &self.rigid_cameras[rigid].model)
+        camera.checked_sub(1).map_or(&self.camera, |rigid| &self.further_cameras[rigid].model)
     }
 
     /// Shutter of a camera by its number, and how well its intrinsics are known.
     pub(crate) fn sensor(&self, camera: usize) -> CameraSensorPrior {
-        camera.checked_sub(1).map_or(self.sensor, |rigid| self.rigid_cameras[rigid].sensor)
+        camera.checked_sub(1).map_or(self.sensor, |rigid| self.further_cameras[rigid].sensor)
     }
 
     /// Prior standard deviations of a camera's extrinsics, in metres and radians.
     pub(crate) fn extrinsics_sigmas(&self, camera: usize) -> (f64, f64) {
         let main = self.chain_prior.unwrap_or(DEFAULT_CHAIN_PRIOR);
-        camera.checked_sub(1).map_or(main, |rigid| self.rigid_cameras[rigid].prior)
+        camera.checked_sub(1).map_or(main, |rigid| self.further_cameras[rigid].prior)
+    }
+
+    /// Other camera of the stereo pair of a camera, by its number; `None` without one. Both images have as many blocks, and
+    /// the intrinsics are fixed.
+    pub(crate) fn partner(&self, camera: usize) -> Option<usize> {
+        let is_rolling = |camera: usize| self.sensor(camera).readout_s != 0.0;
+        let is_partner = |further: &FurtherCamera| further.is_matched && further.base == Some(camera);
+        let partner = self.further_cameras.iter().position(is_partner)? + 1;
+        let same_shutter = self.estimate_readout || is_rolling(camera) == is_rolling(partner);
+        (same_shutter && !self.estimate_intrinsics).then_some(partner)
     }
 
     /// Standard deviation of an encoder reading in radians, `None` if encoders are absent or unused.

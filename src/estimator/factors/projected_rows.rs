@@ -7,7 +7,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::reprojection::{Anchor, VisualFactors, whitened};
-use crate::estimator::state::camera_view::{CameraView, ROLLING_BLOCKS};
+use crate::estimator::state::camera_view::ROLLING_BLOCKS;
 use crate::geometry::triangular_factor::{PORTION, TriangularFactor};
 use crate::optimization::{LandmarkRows, OBSERVATION_ROWS, PoseBlocks};
 
@@ -30,30 +30,32 @@ pub(crate) struct ProjectedRows {
 
 impl ProjectedRows {
     pub(crate) fn new(factors: &VisualFactors<'_>, apart: NewestRows) -> Self {
-        match factors.current.blocks_per_frame() {
+        match factors.current.blocks_per_image() {
             1 => Self::by_blocks::<1>(factors, apart),
             _ => Self::by_blocks::<ROLLING_BLOCKS>(factors, apart),
         }
     }
 
-    /// [`Self::new`] for a camera with `N` blocks per frame.
+    /// [`Self::new`] for a camera with `N` blocks per image.
     fn by_blocks<const N: usize>(factors: &VisualFactors<'_>, apart: NewestRows) -> Self {
         let VisualFactors { model, current, linearized, tracks, landmarks } = *factors;
         let frames = current.frames();
         let newest = frames.saturating_sub(1);
+        let per_frame = current.blocks_per_frame();
         let mut blocks = PoseBlocks::new(current.blocks());
         let columns = BLOCK * current.blocks() + 1;
+        let slot_of = |block: usize| block / per_frame;
         // The newest frame comes first in the triangular factor: the first nonzero entries of a row belong to the
         // newest frame it depends on, and rows of older observations are short. The intrinsics come after all frames.
         let place = |block: usize| {
-            let (slot, row) = (block / N, block % N);
-            BLOCK * if slot < frames { N * (newest - slot) + row } else { block }
+            let (slot, row) = (block / per_frame, block % per_frame);
+            BLOCK * if slot < frames { per_frame * (newest - slot) + row } else { block }
         };
         let mut heights = vec![0; frames];
         for observation in tracks.iter().flat_map(|track| &track.observations) {
             heights[newest - observation.slot] += OBSERVATION_ROWS;
         }
-        let capacity = |(begin, height)| Vec::with_capacity(height * (columns - BLOCK * N * begin));
+        let capacity = |(begin, height)| Vec::with_capacity(height * (columns - BLOCK * per_frame * begin));
         let mut groups: Vec<Vec<f64>> = heights.into_iter().enumerate().map(capacity).collect();
         let mut newest_rows = Vec::new();
         let mut local = LandmarkRows::default();
@@ -61,7 +63,7 @@ impl ProjectedRows {
             let Some(first) = track.observations.first() else { continue };
             let anchor = Anchor::new(current, linearized, first);
             let observers = N * (track.observations.len() - 1);
-            local.begin(CameraView::blocks_of::<N>(first.slot), current.intrinsics_block(), observers);
+            local.begin(current.blocks_of::<N>(first), current.intrinsics_block(), observers);
             let weight = anchor.weight(model, landmark, track);
             for observation in &track.observations {
                 let Some(term) = whitened::<N>(model, &anchor, landmark, observation, weight) else { continue };
@@ -69,23 +71,23 @@ impl ProjectedRows {
                 local.push(&term);
             }
             local.eliminate();
-            let seen_last = first.slot != newest && local.last_observer().map(|block| block / N) == Some(newest);
-            if apart == NewestRows::Apart
-                && seen_last
-                && let Some((added, of_added)) = local.added().next_back()
-            {
-                local.append_to(&mut newest_rows, columns, added, of_added, |block| BLOCK * block);
+            if apart == NewestRows::Apart && first.slot != newest {
+                // Observations are in ascending order: the rows of the newest frame are conditioned on all others.
+                let of_newest = |blocks: &[usize]| blocks.last().is_some_and(|block| slot_of(*block) == newest);
+                for (added, of_added) in local.added().filter(|(_, blocks)| of_newest(blocks)) {
+                    local.append_to(&mut newest_rows, columns, added, of_added, |block| BLOCK * block);
+                }
             }
             for (added, of_added) in local.added() {
-                let slots = of_added.iter().map(|block| block / N).filter(|slot| *slot < frames);
+                let slots = of_added.iter().map(|block| slot_of(*block)).filter(|slot| *slot < frames);
                 let begin = newest - slots.max().unwrap_or(first.slot);
-                let skipped = BLOCK * N * begin;
+                let skipped = BLOCK * per_frame * begin;
                 local.append_to(&mut groups[begin], columns - skipped, added, of_added, |block| place(block) - skipped);
             }
         }
         let mut factor = TriangularFactor::new(columns);
         for (begin, rows) in groups.iter().enumerate() {
-            let skipped = BLOCK * N * begin;
+            let skipped = BLOCK * per_frame * begin;
             let width = columns - skipped;
             for portion in rows.chunks(PORTION * width) {
                 factor.merge(skipped, portion.len() / width, |column, entries| {

@@ -99,7 +99,7 @@ pub(crate) fn observation_residual_px(
     landmark: &Landmark,
     observation: &TrackObservation,
 ) -> Option<Vector2<f64>> {
-    reprojection::residual(view.model(), &anchor.get(observation), landmark, &observation.uv_px)
+    reprojection::residual(view.observer(observation).model(), &anchor.get(observation), landmark, &observation.uv_px)
 }
 
 /// Robust cost (half the sum of losses) of all reprojection factors.
@@ -133,27 +133,27 @@ pub(crate) struct VisualFactors<'a> {
 
 impl VisualFactors<'_> {
     pub(crate) fn equations(&self) -> VisualEquations {
-        match self.current.blocks_per_frame() {
+        match self.current.blocks_per_image() {
             1 => self.equations_by_blocks::<1>(),
             _ => self.equations_by_blocks::<ROLLING_BLOCKS>(),
         }
     }
 
-    /// [`Self::equations`] of a camera with `N` blocks per frame.
+    /// [`Self::equations`] of a camera with `N` blocks per image.
     fn equations_by_blocks<const N: usize>(&self) -> VisualEquations {
         let current = self.current;
         let mut equations = ReprojectionEquations::new(DensePoseEquations::new(current.blocks()), self.tracks.len());
         for (track, landmark) in self.tracks.iter().zip(self.landmarks) {
             // Observations are in ascending order of the slots; the first one is the anchor's.
             let anchor = track.observations.first().map(|first| Anchor::new(current, self.linearized, first));
-            let blocks = anchor.as_ref().map(|anchor| CameraView::blocks_of::<N>(anchor.observation.slot));
+            let blocks = anchor.as_ref().map(|anchor| current.blocks_of::<N>(anchor.observation));
             let of_anchor = |anchor: &Anchor<'_>| anchor.weight(self.model, landmark, track);
             let weight = anchor.as_ref().map_or(RobustWeight::OfTrack(1.0), of_anchor);
             let terms = track
                 .observations
                 .iter()
                 .filter_map(|observation| whitened(self.model, anchor.as_ref()?, landmark, observation, weight));
-            let observations = track.observations.len() * current.blocks_per_frame();
+            let observations = track.observations.len() * current.blocks_per_image();
             equations.add_landmark_by_blocks(blocks, current.intrinsics_block(), observations, terms);
         }
         equations
@@ -200,7 +200,7 @@ pub(crate) enum RobustWeight {
     Known(f64),
 }
 
-/// Linearizes one observation by the `N` blocks per frame, divided by sigma and multiplied by the root of its robust
+/// Linearizes one observation by the `N` blocks per image, divided by sigma and multiplied by the root of its robust
 /// weight.
 #[inline]
 pub(crate) fn whitened<const N: usize>(
@@ -210,8 +210,8 @@ pub(crate) fn whitened<const N: usize>(
     observation: &TrackObservation,
     weight: RobustWeight,
 ) -> Option<BlockTerm<usize, N>> {
-    let camera = anchor.current.model();
-    let in_anchor = observation.slot == anchor.observation.slot;
+    let camera = anchor.current.observer(observation).model();
+    let in_anchor = observation.slot == anchor.observation.slot && !observation.matched;
     let relative = anchor.to_current.get(observation);
     let (linearized, pose) = anchor.to_linearized.with_pose(observation);
     let term = if in_anchor {
@@ -232,6 +232,7 @@ pub(crate) fn whitened<const N: usize>(
     }
     let shared = match anchor.current.intrinsics_block() {
         None => None,
+        Some(_) if observation.matched => None,
         Some(block) => {
             let direction = if in_anchor { landmark.bearing } else { relative.direction(landmark) };
             let (_, _, by_intrinsics) = camera.project_with_intrinsics_jacobian(&direction)?;

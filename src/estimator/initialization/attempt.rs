@@ -3,9 +3,11 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::alignment::{Alignment, AlignmentInput, VectorPrior, align, align_rotations, median_distance};
+use super::bearing::level;
 use super::checks::{Checklist, Shown};
 use super::refinement::{RefinedInitialization, RefinedState, Refinement, RefinementInput};
 use super::selection::{guessed_rotations, select_views};
+use super::stereo::from_stereo;
 use super::structure::{
     Structure, StructureFailure, StructureLimits, ViewPair, collect_tracks, common_bearings, rank_pairs, reconstruct,
     thin_out,
@@ -34,13 +36,22 @@ pub fn try_initialize(input: &InitializationInput<'_>, options: &InitializationO
     if let (Some(stationary), StationaryPolicy::InitializeAtOnce) = (&stationary, options.stationary_policy) {
         return from_stationary(input, stationary, still);
     }
+    let mut of_pair = Checklist::default();
+    if let Some(mut solution) = from_stereo(input, options, stationary.as_ref(), &mut of_pair) {
+        solution.passed = of_pair.passed;
+        return InitializationOutcome::Initialized(Box::new(solution));
+    }
     let mut checklist = Checklist::default();
     match from_motion(input, options, stationary.or(input.stationary).as_ref(), &mut checklist) {
         Some(mut solution) => {
             solution.passed = checklist.passed;
             InitializationOutcome::Initialized(Box::new(solution))
         }
-        None => InitializationOutcome::Waiting { reasons: checklist.failed, passed: checklist.passed, stationary },
+        None => InitializationOutcome::Waiting {
+            reasons: [of_pair.failed, checklist.failed].concat(),
+            passed: [of_pair.passed, checklist.passed].concat(),
+            stationary,
+        },
     }
 }
 
@@ -67,7 +78,7 @@ fn from_stationary(
         })
         .collect();
     InitializationOutcome::Initialized(Box::new(InitializationSolution {
-        origin: InitializationOrigin::FromStationary,
+        origin: InitializationOrigin::Stationary,
         frames,
         bias: ImuBias {
             gyroscope_rad_per_s: stationary.gyroscope_bias_rad_per_s,
@@ -80,16 +91,6 @@ fn from_stationary(
         },
         passed: checklist.passed,
     }))
-}
-
-/// Returns `world_from_imu` that rotates gravity (in the IMU frame, pointing down) to −z, without yaw.
-fn level(gravity_in_imu: &Vector3<f64>) -> UnitQuaternion<f64> {
-    let up = -gravity_in_imu.normalize();
-    // The shortest rotation from `up` to z, or half a revolution about x when they are opposite.
-    let tilt = UnitQuaternion::rotation_between(&up, &Vector3::z())
-        .unwrap_or_else(|| UnitQuaternion::from_scaled_axis(Vector3::x() * std::f64::consts::PI));
-    let forward = tilt * Vector3::x();
-    UnitQuaternion::from_scaled_axis(Vector3::z() * -forward.y.atan2(forward.x)) * tilt
 }
 
 fn from_motion(
@@ -414,7 +415,7 @@ impl AttemptedProblem<'_> {
         let sigmas = refined.sigmas.unwrap_or_default();
         let square = mean_square(&state.landmarks, &state.cameras(&given), self.options.bearing_sigma_rad);
         InitializationSolution {
-            origin: InitializationOrigin::FromMotion,
+            origin: InitializationOrigin::Motion,
             frames,
             bias: state.bias,
             landmarks,

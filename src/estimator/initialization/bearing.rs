@@ -63,6 +63,16 @@ pub fn angle_between(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
     a.cross(b).norm().atan2(a.dot(b))
 }
 
+/// Returns `world_from_imu` that rotates gravity (in the IMU frame, pointing down) to −z, without yaw.
+pub(super) fn level(gravity_in_imu: &Vector3<f64>) -> UnitQuaternion<f64> {
+    let up = -gravity_in_imu.normalize();
+    // The shortest rotation from `up` to z, or half a revolution about x when they are opposite.
+    let tilt = UnitQuaternion::rotation_between(&up, &Vector3::z())
+        .unwrap_or_else(|| UnitQuaternion::from_scaled_axis(Vector3::x() * std::f64::consts::PI));
+    let forward = tilt * Vector3::x();
+    UnitQuaternion::from_scaled_axis(Vector3::z() * -forward.y.atan2(forward.x)) * tilt
+}
+
 /// Camera pose estimated from known points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ResectedPose {

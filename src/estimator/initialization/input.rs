@@ -15,6 +15,8 @@ pub struct InitializationFrame<'a> {
     pub stamp_ns: i64,
     /// Features ordered by id; bearings are unit vectors in the camera.
     pub features: &'a [TrackedFeature],
+    /// Features that the other camera of a stereo pair observes as well, ordered by id; bearings in that camera.
+    pub matched: &'a [TrackedFeature],
     /// Extrinsics from calibration and encoders.
     pub imu_from_camera: RigidTransform,
     /// IMU samples from the previous frame's stamp to this one's, both ends included.
@@ -31,6 +33,16 @@ pub struct InitializationInput<'a> {
     pub stationary: Option<StationaryEstimate>,
     /// Biases estimated by an earlier pass over the log.
     pub bias: Option<BiasPrior>,
+    /// Other camera of the stereo pair of the frames' camera, `None` without one.
+    pub pair: Option<StereoPair>,
+}
+
+/// Other camera of a stereo pair.
+#[derive(Clone, Copy, Debug)]
+pub struct StereoPair {
+    pub camera_from_other: RigidTransform,
+    /// Standard deviations of that pose, in metres and radians.
+    pub sigmas: (f64, f64),
 }
 
 /// Measurements of a stationary vehicle.

@@ -22,6 +22,8 @@
 //! 6. *Acceptance.* Residuals, and the standard deviations of scale, velocity and gravity from the refined problem.
 //!    Constant velocity, hover and pure rotation fail here: their standard deviation of the scale is large.
 //!
+//! With a stereo pair, the points that both cameras observe are tried first: they need no motion.
+//!
 //! The world has z up, its origin at the IMU of the first view, and no yaw there.
 
 mod alignment;
@@ -37,6 +39,7 @@ pub mod relative_pose;
 mod selection;
 mod solution;
 mod stationary;
+mod stereo;
 mod structure;
 mod visual_problem;
 
@@ -47,7 +50,7 @@ mod tests;
 pub use alignment::VectorPrior;
 pub use attempt::try_initialize;
 pub use checks::WaitReason;
-pub use input::{InitializationFrame, InitializationInput, StationaryEstimate};
+pub use input::{InitializationFrame, InitializationInput, StationaryEstimate, StereoPair};
 pub use options::{InitializationOptions, StationaryPolicy};
 pub use reconstruction::{Reconstruction, ReconstructionGuess, reconstruct_views};
 pub use solution::{

@@ -24,9 +24,11 @@ pub enum InitializationOutcome {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InitializationOrigin {
     /// Motion: scale and all states are estimated.
-    FromMotion,
+    Motion,
     /// Stationary vehicle: no landmark has a depth.
-    FromStationary,
+    Stationary,
+    /// Stereo pair, with or without motion: the window has the landmarks.
+    Stereo,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]

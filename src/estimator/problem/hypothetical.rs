@@ -191,11 +191,11 @@ impl HypotheticalWindow {
             };
             let anchor = hypothetical.anchor;
             let Some(uv_px) = self.camera.project(&landmark.bearing) else { continue };
-            let mut observations = vec![TrackObservation { slot: anchor, uv_px }];
+            let mut observations = vec![TrackObservation { slot: anchor, matched: false, uv_px }];
             for slot in hypothetical.observers.iter().copied().filter(|slot| *slot != anchor) {
                 let relative = RelativePose::new(&cameras[anchor], &cameras[slot]);
                 let seen = self.camera.project(&relative.direction(&landmark));
-                observations.extend(seen.map(|uv_px| TrackObservation { slot, uv_px }));
+                observations.extend(seen.map(|uv_px| TrackObservation { slot, matched: false, uv_px }));
             }
             if observations.len() > 1 {
                 tracks.push(Track { observations });

@@ -233,9 +233,9 @@ impl Problem<'_> {
             let moved = |answer: &DMatrix<f64>| camera_moves(layout, maps, &columns, answer);
             let force = &information.with * moved(&with_p) - &information.without * moved(&without_p);
             let own = with_p.rows_range(columns.clone());
-            let of_camera = linearized.calibration.of(camera);
+            let sensors = linearized.calibration.sensor_models(camera);
             for (motion, moves) in
-                motion_parts(&linearized.frames, of_camera, maps, layout.joints).into_iter().enumerate()
+                motion_parts(&linearized.frames, &sensors, maps, layout.joints).into_iter().enumerate()
             {
                 let moves = moves * own;
                 for column in 0..free.len() {

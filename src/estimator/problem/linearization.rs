@@ -52,18 +52,22 @@ impl Problem<'_> {
         let layout = self.layout;
         let linearized = self.linearization_point(estimate);
         let mut measured = Vec::new();
-        let mut norms = Vec::new();
+        // Of the calibration columns of all cameras.
+        let mut squared = vec![0.0; estimate.calibration.imu_columns().start];
         for camera in 0..self.cameras.len() {
-            let maps = CameraMaps::new(&linearized.frames, linearized.calibration.of(camera));
+            let maps = CameraMaps::new(&linearized.frames, &linearized.calibration, camera);
             let apart = if seen.is_some() { NewestRows::Apart } else { NewestRows::Among };
             let projected = self.projected_rows(camera, estimate, &linearized, apart);
             measured.push(self.carried_rows(camera, &projected, &maps));
-            let squared = projected.squared_column_norms(&maps.calibration);
-            norms.extend(squared.iter().map(|squared| squared.max(0.0).sqrt()));
+            let of_camera = projected.squared_column_norms(&maps.calibration);
+            for (column, added) in estimate.calibration.pose_columns(camera).zip(of_camera.iter()) {
+                squared[column] += added.max(0.0);
+            }
             if let Some(seen) = &mut seen {
                 seen.push(CameraInformation::new(&projected, maps));
             }
         }
+        let mut norms: Vec<f64> = squared.into_iter().map(f64::sqrt).collect();
         let point = self.point(estimate, &linearized);
         let mut measured_rows = LabelledRows::new(layout.total());
         measurements(&point, layout.frames, &mut measured_rows);
@@ -111,7 +115,7 @@ impl Problem<'_> {
         let seeing = (0..self.cameras.len()).filter(|camera| !self.cameras[*camera].tracks.is_empty());
         let rows: Vec<DMatrix<f64>> = seeing
             .map(|camera| {
-                let maps = CameraMaps::new(&linearized.frames, linearized.calibration.of(camera));
+                let maps = CameraMaps::new(&linearized.frames, &linearized.calibration, camera);
                 let projected = self.projected_rows(camera, estimate, linearized, NewestRows::Among);
                 self.carried_rows(camera, &projected, &maps)
             })

@@ -25,14 +25,14 @@ use crate::optimization::Landmark;
 pub(crate) struct CameraFactors<'a> {
     pub(crate) visual: VisualModel<'a>,
     pub(crate) tracks: &'a [Track],
-    /// Columns of the camera's calibration.
+    /// Columns of the calibration on which the camera's poses depend.
     pub(crate) columns: Range<usize>,
 }
 
 #[derive(Clone, Debug)]
 pub(crate) struct Problem<'a> {
     pub(crate) layout: Layout,
-    /// Cameras have no common features, so each has a separate visual system.
+    /// Each camera has a separate visual system of its features, with their observations by the other camera of its pair.
     pub(crate) cameras: Vec<CameraFactors<'a>>,
     pub(crate) gravity_in_world: Vector3<f64>,
     pub(crate) frames: &'a [Frame],
@@ -78,7 +78,7 @@ impl Problem<'_> {
 
     /// Camera at the states and the calibration of an estimate.
     pub(crate) fn view<'v>(&'v self, camera: usize, estimate: &'v Estimate) -> CameraView<'v> {
-        CameraView::new(&estimate.frames, estimate.calibration.of(camera), self.cameras[camera].visual.camera)
+        CameraView::new(&estimate.frames, &estimate.calibration, camera, &|camera| self.cameras[camera].visual.camera)
     }
 
     /// Factors' input: residuals at `estimate`, derivatives at `linearized`.
@@ -124,7 +124,7 @@ impl Problem<'_> {
                 let (model, tracks) = (&factors.visual, factors.tracks);
                 CameraEquations {
                     visual: VisualFactors { model, current, linearized, tracks, landmarks }.equations(),
-                    maps: CameraMaps::new(&point.frames, point.calibration.of(camera)),
+                    maps: CameraMaps::new(&point.frames, &point.calibration, camera),
                     columns: factors.columns.clone(),
                 }
             })

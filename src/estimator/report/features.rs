@@ -15,6 +15,8 @@ pub struct FeatureReport {
     pub inverse_depth_per_m: f64,
     /// Observations in the window; the anchor's comes first.
     pub observations: Observations,
+    /// Observations in the window by the other camera of a stereo pair.
+    pub matched: Observations,
     /// True if rejected as an outlier after this solve.
     pub rejected: bool,
 }

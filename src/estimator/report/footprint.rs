@@ -57,7 +57,12 @@ impl StepReport {
             window: of_vec(&self.window) + self.window.iter().map(of_frame).sum::<usize>(),
             calibration: of_calibration(&self.calibration),
             features: of_vec(&self.features),
-            observations: self.features.iter().map(|feature| allocated_bytes(feature.observations.heap_bytes())).sum(),
+            observations: self
+                .features
+                .iter()
+                .flat_map(|feature| [&feature.observations, &feature.matched])
+                .map(|observations| allocated_bytes(observations.heap_bytes()))
+                .sum(),
             landmarks: of_vec(&self.landmarks),
             linearization,
             jacobian: self.jacobian_source.as_ref().map_or(0, JacobianSource::heap_bytes)
@@ -85,6 +90,10 @@ fn of_calibration(calibration: &CalibrationEstimate) -> usize {
         + of_vec(&calibration.prior_sigmas)
         + of_vec(&calibration.classical.links)
         + of_vec(&calibration.margins)
-        + of_vec(&calibration.rigid_cameras)
-        + calibration.rigid_cameras.iter().map(|(key, _)| of_text(key)).sum::<usize>()
+        + of_vec(&calibration.further_cameras)
+        + calibration
+            .further_cameras
+            .iter()
+            .map(|camera| of_text(&camera.key) + camera.base.as_ref().map_or(0, of_text))
+            .sum::<usize>()
 }

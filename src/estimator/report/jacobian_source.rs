@@ -29,8 +29,8 @@ pub struct JacobianSource {
     pub(crate) clocks: Box<[ClockColumns]>,
     /// By slot, if time offsets are estimated: angular rate and velocity of the IMU, then joint rates.
     pub(crate) rates: Box<[f32]>,
-    /// States and calibrations, stored when rows of an image have separate poses or when intrinsics of a camera or of
-    /// the IMU are estimated; the fields above do not cover these cases.
+    /// States and calibrations, stored when rows of an image have separate poses, when a camera is mounted on another one
+    /// or when intrinsics of a camera or of the IMU are estimated; the fields above do not cover these cases.
     pub(crate) exact: Option<Box<ExactSource>>,
     /// True if the calibration has columns.
     pub(crate) calibrated: bool,

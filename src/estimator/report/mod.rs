@@ -18,4 +18,4 @@ pub use jacobian_source::{FactorRows, JacobianFactor, JacobianRow, JacobianSourc
 pub use observations::{ObservationReport, Observations};
 pub use pose_covariance::PoseCovariance;
 pub use residuals::{ResidualSummary, StepWarning};
-pub use step::{CalibrationEstimate, FrameStateReport, Phase, Stage, StageTimes, StepReport};
+pub use step::{CalibrationEstimate, FrameStateReport, FurtherCameraEstimate, Phase, Stage, StageTimes, StepReport};

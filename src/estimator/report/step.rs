@@ -9,6 +9,7 @@ use crate::estimator::problem::information_gain::InformationGain;
 use crate::estimator::problem::linearization::Linearization;
 use crate::estimator::problem::solver::IterationReport;
 use crate::estimator::state::navigation::GimbalImuState;
+use crate::estimator::step_input::OTHER_CAMERA_FRAMES;
 use crate::frontend::FeatureId;
 use crate::geometry::RigidTransform;
 use crate::gimbal::{ClassicalChain, ParameterId, Parameterization, Singularity};
@@ -78,8 +79,21 @@ pub struct CalibrationEstimate {
     pub classical: ClassicalChain,
     /// Singularity margins of the parameterization: base, end, then |sin alpha| of each middle link.
     pub margins: Vec<(Singularity, f64)>,
-    /// Names and extrinsics of the rigid cameras; their columns follow the chain's.
-    pub rigid_cameras: Vec<(String, RigidTransform)>,
+    /// Cameras besides the main one, in the order of their features; their columns follow the chain's.
+    pub further_cameras: Vec<FurtherCameraEstimate>,
+}
+
+/// Extrinsics of a camera besides the main one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FurtherCameraEstimate {
+    /// Key in the rig.
+    pub key: String,
+    /// Number of its parameters.
+    pub number: u8,
+    /// Key of the camera that it is mounted on, `None` for a rigid camera whose pose is relative to the IMU.
+    pub base: Option<String>,
+    /// Pose relative to its base, else to the IMU.
+    pub base_from_camera: RigidTransform,
 }
 
 impl CalibrationEstimate {
@@ -196,6 +210,14 @@ pub struct StepReport {
 }
 
 impl StepReport {
+    /// Name of the frame: the number of the main camera's image, or the number and the camera of another one, as in
+    /// `12 of cam1`.
+    pub fn frame_name(&self) -> String {
+        let (camera, index) = (self.frame_index / OTHER_CAMERA_FRAMES, self.frame_index % OTHER_CAMERA_FRAMES);
+        let other = camera.checked_sub(1).and_then(|further| self.calibration.further_cameras.get(further));
+        other.map_or_else(|| index.to_string(), |other| format!("{index} of {}", other.key))
+    }
+
     /// Standard deviation of a pixel of a feature's camera, per coordinate; NaN while initializing.
     pub fn pixel_sigma_px(&self, feature: FeatureId) -> f64 {
         self.pixel_sigmas_px.get(feature.camera()).copied().unwrap_or(f64::NAN)

@@ -35,7 +35,7 @@ pub(super) struct FirstWindow<'a> {
     solution: &'a InitializationSolution,
     window: SlidingWindow,
     /// Features by frame and camera.
-    observed: Vec<Vec<Vec<TrackedFeature>>>,
+    observed: Vec<Vec<[Vec<TrackedFeature>; 2]>>,
 }
 
 impl<'a> FirstWindow<'a> {
@@ -96,7 +96,8 @@ impl<'a> FirstWindow<'a> {
                 Some(frames) => frames.push(frame),
             }
             extrinsics.push(view.imu_from_camera);
-            features::observe(&mut features[leading], extrinsics.len() - 1, &waiting.features[leading]);
+            let [seen, matched] = &waiting.features[leading];
+            features::observe(&mut features[leading], extrinsics.len() - 1, seen, matched);
             observed.push(waiting.features);
         }
         let mut frames = frames?;
@@ -151,8 +152,9 @@ impl<'a> FirstWindow<'a> {
             start.reference = window.frames.oldest().state.navigation.world_from_imu;
         }
         let (kind, how) = match self.solution.origin {
-            InitializationOrigin::FromMotion => (EventKind::InitializedFromMotion, "motion"),
-            InitializationOrigin::FromStationary => (EventKind::InitializedFromStationary, "a stationary vehicle"),
+            InitializationOrigin::Motion => (EventKind::InitializedFromMotion, "motion"),
+            InitializationOrigin::Stereo => (EventKind::InitializedFromMotion, "a stereo pair"),
+            InitializationOrigin::Stationary => (EventKind::InitializedFromStationary, "a stationary vehicle"),
         };
         let scale_sigma = self.solution.diagnostics.scale_sigma;
         let message = format!(
@@ -176,7 +178,8 @@ impl<'a> FirstWindow<'a> {
         let leading = window.calibration.leading();
         for (slot, by_camera) in self.observed.iter().enumerate() {
             for (camera, features) in by_camera.iter().enumerate().filter(|(camera, _)| *camera != leading) {
-                features::observe(&mut window.features[camera], slot, features);
+                let [seen, matched] = features;
+                features::observe(&mut window.features[camera], slot, seen, matched);
             }
         }
         window.calibration.cameras() > 1
@@ -202,7 +205,8 @@ fn world_from_solution(solution: &InitializationSolution, resume_at: Option<&Rig
 pub(super) struct WaitingFrame {
     pub(super) index: usize,
     pub(super) stamp_ns: i64,
-    pub(super) features: Vec<Vec<TrackedFeature>>,
+    /// Features by camera, and those that the other camera of its pair observes as well.
+    pub(super) features: Vec<[Vec<TrackedFeature>; 2]>,
     pub(super) encoder: Option<JointAngles>,
     /// Extrinsics of the leading camera.
     pub(super) imu_from_camera: RigidTransform,
@@ -223,7 +227,8 @@ impl WaitingFrame {
 
     /// Memory use in bytes, heap included.
     pub(super) fn bytes(&self) -> usize {
-        let features: usize = self.features.iter().map(|seen| seen.capacity() * size_of::<TrackedFeature>()).sum();
+        let features: usize =
+            self.features.iter().flatten().map(|seen| seen.capacity() * size_of::<TrackedFeature>()).sum();
         let encoder = self.encoder.as_ref().map_or(0, JointAngles::heap_bytes);
         size_of::<Self>()
             + features

@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 use super::first_window::{FirstWindow, WaitingFrame, initial_joints_rad};
 use crate::estimator::initialization::{
     InitializationFrame, InitializationInput, InitializationOptions, InitializationOutcome, InitializationSolution,
-    StationaryEstimate, WaitReason, try_initialize,
+    StationaryEstimate, StereoPair, WaitReason, try_initialize,
 };
 use crate::estimator::report::{Event, EventKind, Phase, StepReport};
 use crate::estimator::state::calibrations::{Calibrations, MAIN};
@@ -93,7 +93,7 @@ impl Initializer {
 
     pub(crate) fn drop_features(&mut self, camera: usize, dropped: &impl Fn(FeatureId) -> bool) {
         for frame in &mut self.waiting {
-            if let Some(features) = frame.features.get_mut(camera) {
+            for features in frame.features.get_mut(camera).into_iter().flatten() {
                 features.retain(|feature| !dropped(feature.id));
             }
         }
@@ -129,7 +129,12 @@ impl Initializer {
         self.waiting.push_back(WaitingFrame {
             index: input.frame_index,
             stamp_ns: input.stamp_ns,
-            features: (0..self.calibration.cameras()).map(|camera| input.features(camera).to_vec()).collect(),
+            features: (0..self.calibration.cameras())
+                .map(|camera| {
+                    let matched = self.calibration.matched(camera, input.matched(camera));
+                    [input.features(camera), matched].map(<[_]>::to_vec)
+                })
+                .collect(),
             imu_from_camera: self.calibration.of(self.calibration.leading()).imu_from_camera(&joints_rad),
             encoder,
             imu: input.imu.to_vec(),
@@ -183,7 +188,7 @@ impl Initializer {
     fn attempt(&self, setup: &Setup, options: &InitializationOptions) -> InitializationOutcome {
         let leading = self.calibration.leading();
         // With several cameras the leading one may lack an image; its IMU samples are added to the next frame.
-        let has_image = |frame: &WaitingFrame| frame.features.len() == 1 || !frame.features[leading].is_empty();
+        let has_image = |frame: &WaitingFrame| frame.features.len() == 1 || !frame.features[leading][0].is_empty();
         if !self.waiting.back().is_some_and(has_image) {
             return InitializationOutcome::Waiting { reasons: Vec::new(), passed: Vec::new(), stationary: None };
         }
@@ -207,7 +212,8 @@ impl Initializer {
             .map(|(frame, imu)| InitializationFrame {
                 frame_index: frame.index,
                 stamp_ns: frame.stamp_ns,
-                features: &frame.features[leading],
+                features: &frame.features[leading][0],
+                matched: &frame.features[leading][1],
                 imu_from_camera: frame.imu_from_camera,
                 imu,
             })
@@ -218,6 +224,10 @@ impl Initializer {
             imu_noise: setup.imu_noise,
             stationary: self.stationary,
             bias: setup.found_bias(),
+            pair: self.calibration.of(leading).partner().map(|partner| StereoPair {
+                camera_from_other: self.calibration.of(partner).imu_from_camera(&[]),
+                sigmas: setup.config.extrinsics_sigmas(partner),
+            }),
         };
         try_initialize(&input, options)
     }

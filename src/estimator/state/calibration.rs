@@ -54,6 +54,12 @@ pub(crate) struct Calibration {
     given: Arc<GivenChain>,
     /// Index among the cameras of the run; the main camera has 0.
     camera: usize,
+    /// Number in the names of its parameters; the main camera has 0.
+    number: u8,
+    /// Camera of the run that its pose is relative to; `None` for the IMU.
+    base: Option<usize>,
+    /// Other camera of a stereo pair, mounted on this one, in whose images features of this one are matched.
+    partner: Option<usize>,
     /// True if frames lie at the images of this camera and images of other cameras between them.
     has_frames: bool,
     /// Columns after the chain's, as parameters of the main camera.
@@ -83,6 +89,9 @@ impl Calibration {
             values,
             given: Arc::new(given),
             camera: 0,
+            number: 0,
+            base: None,
+            partner: None,
             has_frames: false,
             sensors: Arc::default(),
             given_readout_s: 0.0,
@@ -93,13 +102,31 @@ impl Calibration {
         }
     }
 
-    /// This calibration as the one of another camera of the run.
-    pub(crate) fn of_camera(self, camera: usize) -> Self {
-        Self { camera, ..self }
+    /// This calibration as the one of another camera of the run, with its number in the names of parameters.
+    pub(crate) fn of_camera(self, camera: usize, number: u8) -> Self {
+        Self { camera, number, ..self }
+    }
+
+    /// This calibration as the one of a camera that is mounted on another one of the run.
+    pub(crate) fn mounted_on(self, base: Option<usize>) -> Self {
+        Self { base, ..self }
     }
 
     pub(crate) fn camera(&self) -> usize {
         self.camera
+    }
+
+    pub(crate) fn base(&self) -> Option<usize> {
+        self.base
+    }
+
+    /// This calibration with the other camera of a stereo pair.
+    pub(crate) fn with_partner(self, partner: Option<usize>) -> Self {
+        Self { partner, ..self }
+    }
+
+    pub(crate) fn partner(&self) -> Option<usize> {
+        self.partner
     }
 
     /// This calibration as the one of the camera at whose images frames lie, or of another one.
@@ -340,6 +367,11 @@ impl Calibration {
         }
         // Invalid intrinsics occur only when a solver step goes far out of range; the given model then yields the cost.
         given.with_intrinsics(intrinsics).map_or(Cow::Borrowed(given), Cow::Owned)
+    }
+
+    /// Parameters of all columns, free or not.
+    pub(crate) fn numbered_parameters(&self) -> Vec<ParameterId> {
+        self.parameters().into_iter().map(|parameter| parameter.of_camera(self.number)).collect()
     }
 
     /// Parameters of all columns, free or not, with the names of the main camera's parameters.

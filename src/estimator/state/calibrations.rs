@@ -9,6 +9,7 @@ use super::calibration_posterior::CalibrationPosterior;
 use super::earlier_pass::FoundCamera;
 use super::imu_calibration::ImuCalibration;
 use super::imu_errors::{self, ImuErrors};
+use crate::frontend::TrackedFeature;
 use crate::gimbal::{ParameterId, Parameterization};
 
 /// Index of the main camera, which may have joints. The window shows its image; its calibration has the first columns.
@@ -23,8 +24,7 @@ pub(crate) struct Calibrations {
 
 impl Calibrations {
     pub(crate) fn new(main: Calibration, rigid: impl IntoIterator<Item = Calibration>) -> Self {
-        let cameras = std::iter::once(main).chain(rigid).enumerate();
-        Self { cameras: cameras.map(|(index, one)| one.of_camera(index)).collect(), imu: None }
+        Self { cameras: std::iter::once(main).chain(rigid).collect(), imu: None }
     }
 
     /// These calibrations with the frames at the images of one camera; `None` if all images of a frame have one stamp.
@@ -126,7 +126,8 @@ impl Calibrations {
     /// Camera that starts the window: the one at whose images frames lie, else a rigid one if there is one, since its
     /// extrinsics are most accurate.
     pub(crate) fn leading(&self) -> usize {
-        let rigid = || self.cameras.iter().position(|calibration| calibration.joint_count() == 0);
+        let is_rigid = |calibration: &Calibration| calibration.base().is_none() && calibration.joint_count() == 0;
+        let rigid = || self.cameras.iter().position(is_rigid);
         self.cameras.iter().position(Calibration::has_frames).or_else(rigid).unwrap_or(MAIN)
     }
 
@@ -138,11 +139,8 @@ impl Calibrations {
     /// Parameters of all columns, free or not: chain and sensor columns of the main camera, then the rigid
     /// cameras, then the IMU.
     pub(crate) fn parameters(&self) -> Vec<ParameterId> {
-        let of = |(camera, one): (usize, &Calibration)| {
-            one.parameters().into_iter().map(move |parameter| parameter.of_camera(camera as u8))
-        };
         let imu = self.imu.iter().flat_map(|_| imu_errors::parameters());
-        self.cameras.iter().enumerate().flat_map(of).chain(imu).collect()
+        self.cameras.iter().flat_map(Calibration::numbered_parameters).chain(imu).collect()
     }
 
     /// Values of all columns, free or not.
@@ -165,6 +163,24 @@ impl Calibrations {
     pub(crate) fn columns(&self, camera: usize) -> Range<usize> {
         let start = self.cameras[..camera].iter().map(Calibration::dof).sum();
         start..start + self.cameras[camera].dof()
+    }
+
+    /// Range of the columns on which the observations of a camera's features depend: its own, those from the first one of
+    /// the camera that it is mounted on, and those to the last one of the other camera of its pair.
+    pub(crate) fn pose_columns(&self, camera: usize) -> Range<usize> {
+        let (one, own) = (self.of(camera), self.columns(camera));
+        let start = one.base().map_or(own.start, |base| self.columns(base).start);
+        start..one.partner().map_or(own.end, |partner| self.columns(partner).end)
+    }
+
+    /// The matched features of a camera if the other one of its pair is in the run, else none.
+    pub(crate) fn matched<'m>(&self, camera: usize, matched: &'m [TrackedFeature]) -> &'m [TrackedFeature] {
+        if self.of(camera).partner().is_some() { matched } else { &[] }
+    }
+
+    /// A camera, and the other one of its stereo pair.
+    pub(crate) fn observers(&self, camera: usize) -> impl Iterator<Item = usize> {
+        std::iter::once(camera).chain(self.of(camera).partner())
     }
 
     /// Columns fixed at their values.

@@ -6,9 +6,10 @@ use std::ops::Range;
 use nalgebra::{DMatrix, Matrix3, Matrix6, Matrix6x3, Matrix6xX, Vector3};
 
 use super::calibration::Calibration;
+use super::calibrations::Calibrations;
 use super::frame_state::{Exposure, FrameState};
 use super::layout::{Layout, POSE, ROW_MOTION};
-use crate::geometry::so3;
+use crate::geometry::{RigidTransform, so3};
 use crate::gimbal::{Chain, ChainLinearization};
 use crate::optimization::CameraPose;
 
@@ -19,9 +20,13 @@ pub(crate) const ROLLING_ROWS: [f64; 3] = [0.0, 0.5, 1.0];
 #[derive(Clone, Debug)]
 pub(crate) struct CameraCalibration<'a> {
     pub(crate) chain: Cow<'a, Chain>,
+    /// Pose relative to the camera at the end of `chain`, without joints, and its first column; `None` if the camera is that
+    /// one.
+    pub(crate) mounted: Option<(Cow<'a, Chain>, usize)>,
     /// Index among the cameras of the run.
     pub(crate) camera: usize,
-    /// Number of calibration columns: chain, then time offset, shutter and intrinsics; zero when fixed.
+    /// Number of calibration columns: chain, then time offset, shutter and intrinsics; zero when fixed. Of a camera that is
+    /// mounted on another one, those from the first column of the other one to its own last one.
     pub(crate) columns: usize,
     /// Time offset in seconds: exposure time of the first row minus stamp.
     pub(crate) shift_s: f64,
@@ -43,8 +48,24 @@ impl CameraCalibration<'_> {
         &joints_rad[..self.chain.joint_count().min(joints_rad.len())]
     }
 
-    fn linearize(&self, joints_rad: &[f64]) -> ChainLinearization {
+    pub(crate) fn joint_count(&self) -> usize {
+        self.chain.joint_count()
+    }
+
+    pub(crate) fn imu_from_camera(&self, joints_rad: &[f64]) -> RigidTransform {
+        let imu_from_base = self.chain.imu_from_camera(self.own(joints_rad));
+        match &self.mounted {
+            Some((mounted, _)) => imu_from_base * mounted.imu_from_camera(&[]),
+            None => imu_from_base,
+        }
+    }
+
+    /// `imu_from_camera` with its derivatives by the columns and the joint angles.
+    pub(crate) fn linearize(&self, joints_rad: &[f64]) -> ChainLinearization {
         let mut linearization = self.chain.linearize(self.own(joints_rad));
+        if let Some((mounted, column)) = &self.mounted {
+            return linearization.followed_by(&mounted.linearize(&[]), *column, self.columns);
+        }
         if linearization.by_parameters.ncols() != self.columns {
             linearization.by_parameters = linearization.by_parameters.resize_horizontally(self.columns, 0.0);
         }
@@ -63,12 +84,42 @@ impl CameraCalibration<'_> {
     }
 }
 
+impl Calibrations {
+    /// Extrinsics, time offset and shutter of the cameras that observe the features of a camera, over its
+    /// [`Self::pose_columns`]: its own, and those of the other camera of its pair.
+    pub(crate) fn sensor_models(&self, camera: usize) -> Vec<CameraCalibration<'_>> {
+        self.observers(camera).map(|observer| self.sensor_model(observer)).collect()
+    }
+
+    /// Extrinsics, time offset and shutter of a camera, over its [`Self::pose_columns`].
+    pub(crate) fn sensor_model(&self, camera: usize) -> CameraCalibration<'_> {
+        let own = self.of(camera).sensor_model();
+        let Some(base) = self.of(camera).base() else {
+            // A pair begins at the columns of its first camera.
+            return CameraCalibration { columns: self.pose_columns(camera).len(), ..own };
+        };
+        let (first, columns) = (self.columns(camera).start, self.pose_columns(camera));
+        let own_column = first - columns.start;
+        let placed = |column: usize| own_column + column;
+        CameraCalibration {
+            chain: Cow::Borrowed(self.of(base).chain()),
+            mounted: Some((own.chain, own_column)),
+            columns: columns.len(),
+            shift_column: own.shift_column.map(placed),
+            readout_column: own.readout_column.map(placed),
+            intrinsics: placed(own.intrinsics.start)..placed(own.intrinsics.end),
+            ..own
+        }
+    }
+}
+
 impl Calibration {
-    /// Extrinsics, time offset and shutter of the camera.
+    /// Extrinsics, time offset and shutter of a camera that is not mounted on another one.
     pub(crate) fn sensor_model(&self) -> CameraCalibration<'_> {
         let free = self.dof() > 0;
         CameraCalibration {
             chain: Cow::Borrowed(self.chain()),
+            mounted: None,
             camera: self.camera(),
             columns: self.dof(),
             shift_s: self.camera_shift_s(),
@@ -90,7 +141,7 @@ pub(crate) fn at(state: &FrameState, calibration: &Calibration) -> CameraPose {
 /// `world_from_camera` at a state and the exposure of a row: 0 for the first row, 1 for the end of the last one.
 pub(crate) fn at_row(state: &FrameState, sensor: &CameraCalibration<'_>, row: f64) -> CameraPose {
     let state = &*state_at(state, &sensor.exposure(state, row));
-    let pose = state.navigation.world_from_imu * sensor.chain.imu_from_camera(sensor.own(&state.joints_rad));
+    let pose = state.navigation.world_from_imu * sensor.imu_from_camera(&state.joints_rad);
     CameraPose { rotation: pose.rotation_matrix(), position_m: pose.translation_m }
 }
 
@@ -112,27 +163,28 @@ pub(crate) struct CameraMaps {
 }
 
 impl CameraMaps {
-    /// Derivatives at these states and this calibration.
-    pub(crate) fn new(frames: &[FrameState], calibration: &Calibration) -> Self {
-        Self::of_sensor(frames, &calibration.sensor_model())
+    /// Derivatives at these states and the calibration of a camera.
+    pub(crate) fn new(frames: &[FrameState], calibrations: &Calibrations, camera: usize) -> Self {
+        Self::of_sensors(frames, &calibrations.sensor_models(camera))
     }
 
-    /// [`Self::new`] for a given sensor.
+    /// [`Self::new`] for given sensors over the same columns, with as many rows each.
     ///
     /// With constant rates, the derivatives of the shifted pose by velocity and gyroscope bias are neglected: a bias
     /// change has no effect over a centisecond. Along a measured motion they are included.
-    pub(crate) fn of_sensor(frames: &[FrameState], sensor: &CameraCalibration<'_>) -> Self {
-        let rows = sensor.block_rows();
+    pub(crate) fn of_sensors(frames: &[FrameState], sensors: &[CameraCalibration<'_>]) -> Self {
+        let blocks = || sensors.iter().flat_map(|sensor| sensor.block_rows().iter().map(move |row| (sensor, *row)));
         let mut maps =
-            Self { own: Vec::new(), calibration: Vec::new(), blocks_per_frame: rows.len(), frames: frames.len() };
+            Self { own: Vec::new(), calibration: Vec::new(), blocks_per_frame: blocks().count(), frames: frames.len() };
         for stamped in frames {
-            for row in rows {
-                let (own, calibration) = block_map(stamped, sensor, *row);
+            for (sensor, row) in blocks() {
+                let (own, calibration) = block_map(stamped, sensor, row);
                 maps.own.push(own);
                 maps.calibration.push(calibration);
             }
         }
-        if !sensor.intrinsics.is_empty() {
+        // Features of a pair are not matched while intrinsics are estimated.
+        if let Some(sensor) = sensors.first().filter(|sensor| !sensor.intrinsics.is_empty()) {
             let mut selection = DMatrix::zeros(6, sensor.columns);
             for (row, column) in sensor.intrinsics.clone().enumerate() {
                 selection[(row, column)] = 1.0;

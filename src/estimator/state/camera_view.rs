@@ -5,7 +5,7 @@ use std::cell::OnceCell;
 
 use nalgebra::{Matrix2x6, Vector2, Vector3};
 
-use super::calibration::Calibration;
+use super::calibrations::Calibrations;
 use super::camera_pose::{self, CameraCalibration, ROLLING_ROWS};
 use super::frame_state::FrameState;
 use crate::camera::CameraModel;
@@ -17,14 +17,17 @@ pub(crate) const ROLLING_BLOCKS: usize = ROLLING_ROWS.len();
 /// Camera with its intrinsics and poses at an estimate.
 ///
 /// Derivatives are in blocks of six. A global shutter has one block per frame, the pose `[φ; δt]` of
-/// `world_from_camera`; a rolling shutter has three, the poses of the first, the middle and the last row. The
-/// intrinsics, if estimated, follow after all frames. [`camera_pose::CameraMaps`] has the same blocks.
+/// `world_from_camera`; a rolling shutter has three, the poses of the first, the middle and the last row. In a stereo pair
+/// the blocks of the other camera follow in each frame. The intrinsics, if estimated, follow after all frames.
+/// [`camera_pose::CameraMaps`] has the same blocks.
 #[derive(Clone, Debug)]
 pub(crate) struct CameraView<'a> {
     model: Cow<'a, CameraModel>,
     has_intrinsics: bool,
     frames: usize,
     poses: Poses<'a>,
+    /// Other camera of a stereo pair, which observes features of this one; with as many blocks per frame.
+    partner: Option<Box<Self>>,
 }
 
 #[derive(Clone, Debug)]
@@ -44,21 +47,23 @@ enum Poses<'a> {
 }
 
 impl<'a> CameraView<'a> {
-    /// Camera of a calibration over the frames of a window; `given` is the rig's model.
-    pub(crate) fn new(frames: &'a [FrameState], calibration: &'a Calibration, given: &'a CameraModel) -> Self {
+    /// A camera over the frames of a window; `given` returns the rig's model of a camera.
+    pub(crate) fn new(
+        frames: impl Into<Cow<'a, [FrameState]>>,
+        calibrations: &'a Calibrations,
+        camera: usize,
+        given: &dyn Fn(usize) -> &'a CameraModel,
+    ) -> Self {
+        let frames = frames.into();
+        let calibration = calibrations.of(camera);
         let has_intrinsics = !calibration.intrinsics_columns().is_empty();
-        Self::of_sensor(
-            Cow::Borrowed(frames),
-            calibration.sensor_model(),
-            calibration.camera_model(given),
-            has_intrinsics,
-        )
-    }
-
-    /// [`Self::new`] with owned states.
-    pub(crate) fn of_states(frames: Vec<FrameState>, calibration: &'a Calibration, given: &'a CameraModel) -> Self {
-        let has_intrinsics = !calibration.intrinsics_columns().is_empty();
-        Self::of_sensor(Cow::Owned(frames), calibration.sensor_model(), calibration.camera_model(given), has_intrinsics)
+        let partner = calibration.partner().map(|partner| {
+            // The partner of a pair has none.
+            Box::new(Self::new(frames.clone(), calibrations, partner, given))
+        });
+        let sensor = calibrations.sensor_model(camera);
+        let view = Self::of_sensor(frames, sensor, calibration.camera_model(given(camera)), has_intrinsics);
+        Self { partner, ..view }
     }
 
     /// [`Self::new`] for a given sensor.
@@ -76,7 +81,7 @@ impl<'a> CameraView<'a> {
             let poses: Vec<CameraPose> = frames.iter().map(|state| camera_pose::at_row(state, &sensor, 0.0)).collect();
             Poses::Global { relative: OnceCell::new(), poses }
         };
-        Self { model, has_intrinsics, frames: count, poses }
+        Self { model, has_intrinsics, frames: count, poses, partner: None }
     }
 
     /// Camera with a global shutter at given poses by slot.
@@ -87,6 +92,7 @@ impl<'a> CameraView<'a> {
             has_intrinsics: false,
             frames,
             poses: Poses::Global { poses, relative: OnceCell::new() },
+            partner: None,
         }
     }
 
@@ -105,11 +111,26 @@ impl<'a> CameraView<'a> {
         !self.has_intrinsics && matches!(self.poses, Poses::Global { .. })
     }
 
-    pub(crate) fn blocks_per_frame(&self) -> usize {
+    /// Blocks of the pose of an image.
+    pub(crate) fn blocks_per_image(&self) -> usize {
         match self.poses {
             Poses::Global { .. } => 1,
             Poses::Rolling { .. } => ROLLING_BLOCKS,
         }
+    }
+
+    pub(crate) fn blocks_per_frame(&self) -> usize {
+        self.blocks_per_image() * if self.partner.is_some() { 2 } else { 1 }
+    }
+
+    /// The other camera of a stereo pair, `None` without one.
+    pub(crate) fn partner(&self) -> Option<&Self> {
+        self.partner.as_deref()
+    }
+
+    /// Camera that made an observation: this one, or the other one of the pair.
+    pub(crate) fn observer(&self, observation: &TrackObservation) -> &Self {
+        self.partner.as_deref().filter(|_| observation.matched).unwrap_or(self)
     }
 
     pub(crate) fn blocks(&self) -> usize {
@@ -125,9 +146,10 @@ impl<'a> CameraView<'a> {
         self.has_intrinsics.then(|| self.frames * self.blocks_per_frame())
     }
 
-    /// Blocks of the pose of a frame, `N` per frame ([`Self::blocks_per_frame`]).
-    pub(crate) fn blocks_of<const N: usize>(slot: usize) -> [usize; N] {
-        std::array::from_fn(|row| N * slot + row)
+    /// Blocks of the pose of an observation, `N` per image ([`Self::blocks_per_image`]).
+    pub(crate) fn blocks_of<const N: usize>(&self, observation: &TrackObservation) -> [usize; N] {
+        let first = self.blocks_per_frame() * observation.slot + if observation.matched { N } else { 0 };
+        std::array::from_fn(|row| first + row)
     }
 
     /// `world_from_camera` at the row of a pixel.
@@ -163,7 +185,7 @@ impl<'a> CameraView<'a> {
     ///
     /// A change of the pose at the fraction f of the image is interpolated between the first, the middle and the last row
     /// by a parabola, `(2f − 1)(f − 1)`, `4f (1 − f)` and `f (2f − 1)` of them, rotations in world axes; `N` is
-    /// [`Self::blocks_per_frame`]. The interpolation is exact for changes of pose, velocity, readout time, joint rates and
+    /// [`Self::blocks_per_image`]. The interpolation is exact for changes of pose, velocity, readout time, joint rates and
     /// joint accelerations, except that the rotation of their axes during the readout is of second order.
     pub(crate) fn by_blocks<const N: usize>(
         &self,
@@ -171,9 +193,10 @@ impl<'a> CameraView<'a> {
         pose: &CameraPose,
         by_pose: &Matrix2x6<f64>,
     ) -> PoseBlocksOf<usize, N> {
-        let slot = observation.slot;
-        let Poses::Rolling { rows, .. } = &self.poses else { return [(slot, *by_pose); N] };
-        let fraction = self.row_fraction(&observation.uv_px);
+        let (slot, blocks) = (observation.slot, self.blocks_of::<N>(observation));
+        let observer = self.observer(observation);
+        let Poses::Rolling { rows, .. } = &observer.poses else { return blocks.map(|block| (block, *by_pose)) };
+        let fraction = observer.row_fraction(&observation.uv_px);
         let by_world = by_pose.fixed_columns::<3>(0) * pose.rotation.transpose();
         let weights = [
             (2.0 * fraction - 1.0) * (fraction - 1.0),
@@ -183,7 +206,7 @@ impl<'a> CameraView<'a> {
         std::array::from_fn(|row| {
             let mut by_row = by_pose * weights[row];
             by_row.fixed_columns_mut::<3>(0).copy_from(&(by_world * rows[slot][row].rotation * weights[row]));
-            (N * slot + row, by_row)
+            (blocks[row], by_row)
         })
     }
 }
@@ -205,6 +228,10 @@ impl<'a> RelativeTo<'a> {
 
     /// [`Self::get`], and the pose at the row of the observation.
     pub(crate) fn with_pose(&self, observation: &TrackObservation) -> (Cow<'a, RelativePose>, Cow<'a, CameraPose>) {
+        if observation.matched {
+            let pose = self.view.observer(observation).pose(observation.slot, &observation.uv_px);
+            return (Cow::Owned(RelativePose::new(&self.pose, &pose)), Cow::Owned(pose));
+        }
         match &self.view.poses {
             Poses::Global { poses, relative } => {
                 let relative = relative.get_or_init(|| RelativePoses::new(poses)).get(self.slot, observation.slot);
@@ -221,12 +248,14 @@ impl<'a> RelativeTo<'a> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct TrackObservation {
     pub(crate) slot: usize,
+    /// True if the other camera of a stereo pair made it.
+    pub(crate) matched: bool,
     pub(crate) uv_px: Vector2<f64>,
 }
 
 /// Observations of one feature in the solve.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Track {
-    /// By ascending slot; the anchor's comes first.
+    /// By ascending slot, of the camera itself before the other one of a pair; the anchor's comes first.
     pub(crate) observations: Vec<TrackObservation>,
 }

@@ -49,7 +49,7 @@ impl BothFlights {
 
     fn config(&self) -> EstimatorConfig {
         EstimatorConfig {
-            rigid_cameras: vec![fixture::rigid_camera(&self.rigid)],
+            further_cameras: vec![fixture::rigid_camera(&self.rigid)],
             ..fixture::config(&self.gimbal.given_rig, Parameterization::Minimal, EstimatorOptions::default())
         }
     }
@@ -58,9 +58,9 @@ impl BothFlights {
     fn step(&self, estimator: &mut Estimator, index: usize, [gimbal, rigid]: [bool; 2]) -> StepReport {
         let nothing = TrackedFrame::default();
         let [frame, beside] = [&self.gimbal, &self.rigid].map(|flight| &flight.frames[index]);
-        let (tracks, rigid_tracks) =
+        let (tracks, further_tracks) =
             (if gimbal { &frame.tracks } else { &nothing }, if rigid { &beside.tracks } else { &nothing });
-        fixture::step(estimator, frame, tracks, &[rigid_tracks])
+        fixture::step(estimator, frame, tracks, &[further_tracks])
     }
 
     /// Runs one step with a frame at the rigid camera's image.
@@ -76,7 +76,7 @@ impl BothFlights {
             gimbal_imu: &[],
             joint_angles: joint_angles.as_ref(),
             tracks: &main.tracks,
-            rigid_tracks: &[&frame.tracks],
+            further_tracks: &[&frame.tracks],
         })
     }
 
@@ -115,7 +115,7 @@ impl Errors {
         let config = flights.config();
         let given = chain_error(&flights.gimbal, &Estimator::new(config.clone()));
         assert!(given.1 > 5.0_f64.to_radians(), "seed {seed}: the chain is given wrong by {} rad", given.1);
-        let alone = EstimatorConfig { rigid_cameras: Vec::new(), ..config.clone() };
+        let alone = EstimatorConfig { further_cameras: Vec::new(), ..config.clone() };
         let (estimator, reports) = run_flight(&flights.gimbal.frames, alone);
         let gimbal_m = trajectory_error_m(&flights.gimbal.frames, &reports).0;
         let gimbal_rad = chain_error(&flights.gimbal, &estimator).1;
@@ -187,7 +187,7 @@ fn both_calibrations_have_named_columns() {
     assert!(calibration.sigmas.iter().zip(&calibration.prior_sigmas).all(|(after, before)| after < before));
     let linearization = last.linearization.as_ref().unwrap();
     assert_eq!(linearization.calibration_column_norms.len(), 24);
-    let cameras = [&estimator.config().camera, &estimator.config().rigid_cameras[0].model];
+    let cameras = [&estimator.config().camera, &estimator.config().further_cameras[0].model];
     crate::estimator::tests::jacobian::check(last, &cameras);
     let columns: Vec<_> = linearization.columns[..24].iter().filter_map(|column| column.id.parameter()).collect();
     assert_eq!(columns, calibration.parameters);
@@ -196,9 +196,10 @@ fn both_calibrations_have_named_columns() {
     let ground_truth = flights.rigid.true_rig.chain_of_camera("cam0").unwrap().imu_from_camera(&[]);
     let angle =
         |pose: &crate::geometry::RigidTransform| so3::log(&(pose.rotation.inverse() * ground_truth.rotation)).norm();
-    let [(key, mount)] = calibration.rigid_cameras.as_slice() else { panic!("one rigid camera") };
+    let [rigid] = calibration.further_cameras.as_slice() else { panic!("one rigid camera") };
+    let (key, mount) = (&rigid.key, &rigid.base_from_camera);
     assert_eq!(key, "cam1");
-    let given = estimator.config().rigid_cameras[0].imu_from_camera;
+    let given = estimator.config().further_cameras[0].base_from_camera;
     assert!(angle(mount) < 0.3 * angle(&given), "{} of {} rad", angle(mount), angle(&given));
 
     // Feature ids distinguish the cameras.
@@ -232,7 +233,7 @@ fn fixed_calibrations_keep_their_given_values() {
     let (estimator, reports) = flights.run_flight(config, both);
     assert_eq!(estimator.classical_chain(), given);
     let calibration = &reports.last().unwrap().calibration;
-    assert_eq!(calibration.rigid_cameras[0].1, fixture::rigid_camera(&flights.rigid).imu_from_camera);
+    assert_eq!(calibration.further_cameras[0].base_from_camera, fixture::rigid_camera(&flights.rigid).base_from_camera);
     assert_eq!(calibration.sigmas, vec![0.0; 24]);
 }
 

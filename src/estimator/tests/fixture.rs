@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::Noise;
-use crate::estimator::config::{CameraSensorPrior, EstimatorConfig, EstimatorOptions, RigidCamera};
+use crate::estimator::config::{CameraSensorPrior, EstimatorConfig, EstimatorOptions, FurtherCamera, rigid_chain};
 use crate::estimator::estimator::PhaseState;
 use crate::estimator::factors::kind::FactorLabel;
 use crate::estimator::factors::labelled_rows::{LabelledRows, stack};
@@ -24,10 +24,10 @@ use crate::estimator::window::loss_scale::LossScale;
 use crate::estimator::window::setup::Setup;
 use crate::estimator::window::window_state::WindowState;
 use crate::estimator::{DEFAULT_CHAIN_PRIOR, Estimator, StepInput};
-use crate::frontend::TrackedFrame;
+use crate::frontend::{TrackedFeature, TrackedFrame};
 use crate::geometry::{Dimension, seconds_from_ns};
 use crate::gimbal::{Chain, ParameterId, Parameterization};
-use crate::sensors::{ImuSample, Rig};
+use crate::sensors::{ChainPrior, ImuSample, Rig};
 use crate::simulation::{
     Exercise, JointSwing, SyntheticFlight, SyntheticFrame, SyntheticMotion, SyntheticMount, SyntheticOptions,
     VehicleSwing, synthetic_tracks,
@@ -89,13 +89,32 @@ pub(super) fn config(rig: &Rig, parameterization: Parameterization, options: Est
     }
 }
 
+/// Camera of a flight beside the one of another flight, which is camera `base` of the run.
+fn camera_beside(flight: &SyntheticFlight, base: usize, number: u8) -> FurtherCamera {
+    let rig = &flight.given_rig;
+    FurtherCamera {
+        number,
+        key: format!("cam{number}"),
+        model: rig.cameras[1].model.clone(),
+        base: Some(base),
+        is_matched: false,
+        base_from_camera: rig.base_from_camera(Some("cam0"), "cam1").unwrap(),
+        prior: ChainPrior::RELATIVE.sigmas(),
+        timeshift_s: 0.0,
+        sensor: CameraSensorPrior::default(),
+    }
+}
+
 /// Camera of a rigid flight, as `cam1`.
-pub(super) fn rigid_camera(flight: &SyntheticFlight) -> RigidCamera {
-    RigidCamera {
+pub(super) fn rigid_camera(flight: &SyntheticFlight) -> FurtherCamera {
+    FurtherCamera {
+        number: 1,
         timeshift_s: 0.0,
         key: "cam1".to_owned(),
         model: flight.given_rig.cameras[0].model.clone(),
-        imu_from_camera: flight.given_rig.chain_of_camera("cam0").unwrap().imu_from_camera(&[]),
+        base: None,
+        is_matched: false,
+        base_from_camera: flight.given_rig.chain_of_camera("cam0").unwrap().imu_from_camera(&[]),
         prior: DEFAULT_CHAIN_PRIOR,
         sensor: CameraSensorPrior::default(),
     }
@@ -106,9 +125,9 @@ pub(super) fn step(
     estimator: &mut Estimator,
     frame: &SyntheticFrame,
     tracks: &TrackedFrame,
-    rigid_tracks: &[&TrackedFrame],
+    further_tracks: &[&TrackedFrame],
 ) -> StepReport {
-    step_before(estimator, frame, None, tracks, rigid_tracks)
+    step_before(estimator, frame, None, tracks, further_tracks)
 }
 
 /// [`step`] with the IMU samples of the next frame, during which the rows of a rolling shutter are exposed.
@@ -117,7 +136,7 @@ pub(super) fn step_before(
     frame: &SyntheticFrame,
     next: Option<&SyntheticFrame>,
     tracks: &TrackedFrame,
-    rigid_tracks: &[&TrackedFrame],
+    further_tracks: &[&TrackedFrame],
 ) -> StepReport {
     let joint_angles = estimator.config().encoder_sigma_rad.and_then(|sigma_rad| frame.encoder_angles(sigma_rad));
     estimator.step(&StepInput {
@@ -129,7 +148,7 @@ pub(super) fn step_before(
         gimbal_imu: &frame.gimbal_imu,
         joint_angles: joint_angles.as_ref(),
         tracks,
-        rigid_tracks,
+        further_tracks,
     })
 }
 
@@ -148,7 +167,7 @@ fn flight_options(gimbal: bool) -> SyntheticOptions {
 
 /// Window of six frames at the ground truth (landmarks from the noisy tracks), with the given chain.
 pub(super) fn window(parameterization: Parameterization, gimbal: bool, options: EstimatorOptions) -> TestWindow {
-    window_of(&flight(gimbal), None, config(&flight(gimbal).given_rig, parameterization, options))
+    window_of(&flight(gimbal), &[], config(&flight(gimbal).given_rig, parameterization, options))
 }
 
 /// [`window`] of a gimballed and a rigid camera, with all time offsets if `estimate_timeshift`.
@@ -156,11 +175,66 @@ pub(super) fn cluster_window(options: EstimatorOptions, estimate_timeshift: bool
     let (main, rigid) = (flight(true), flight(false));
     assert_eq!(main.frames[7].imu, rigid.frames[7].imu, "one flight");
     let config = EstimatorConfig {
-        rigid_cameras: vec![rigid_camera(&rigid)],
+        further_cameras: vec![rigid_camera(&rigid)],
         estimate_timeshift,
         ..config(&main.given_rig, Parameterization::Minimal, options)
     };
-    window_of(&main, Some(&rigid), config)
+    window_of(&main, &[&rigid], config)
+}
+
+/// [`cluster_window`] with a camera beside the rigid one and a second one on the gimbal.
+pub(super) fn mounted_window(options: EstimatorOptions, estimate_intrinsics: bool) -> TestWindow {
+    let (main, rigid) = (flight(true), flight(false));
+    let beside = |gimbal| synthetic_tracks(&SyntheticOptions { beside: true, ..flight_options(gimbal) });
+    let (right, second) = (beside(false), beside(true));
+    assert_eq!(main.frames[7].imu, right.frames[7].imu, "one flight");
+    let config = EstimatorConfig {
+        further_cameras: vec![rigid_camera(&rigid), camera_beside(&right, 1, 2), camera_beside(&second, MAIN, 3)],
+        estimate_intrinsics,
+        ..config(&main.given_rig, Parameterization::Minimal, options)
+    };
+    window_of(&main, &[&rigid, &right, &second], config)
+}
+
+/// Flight of a rigid camera with the observations of its features by the right one of a stereo pair, and the flight of that
+/// one.
+pub(super) fn stereo_flights(options: &SyntheticOptions) -> [SyntheticFlight; 2] {
+    let options = SyntheticOptions { mount: SyntheticMount::Static, ..options.clone() };
+    let mut flight = synthetic_tracks(&options);
+    let right = synthetic_tracks(&SyntheticOptions { beside: true, ..options.clone() });
+    let model = &right.true_rig.cameras[1].model;
+    let mut random = Noise::new(5);
+    for (frame, right) in flight.frames.iter_mut().zip(&right.frames) {
+        for feature in &frame.tracks.features {
+            let Some(point_m) = flight.landmarks.get(&feature.id) else { continue };
+            let in_right = right.true_world_from_camera.inverse().transform(point_m);
+            let seen_px = model.project(&in_right).filter(|uv_px| model.contains(uv_px, 0.0));
+            let noisy_px = seen_px.map(|uv_px| uv_px.map(|at| at + options.pixel_sigma_px * random.normal()));
+            let observed = noisy_px.and_then(|uv_px| Some((uv_px, model.unproject(&uv_px)?)));
+            frame.tracks.matched.extend(observed.map(|(uv_px, bearing)| TrackedFeature { uv_px, bearing, ..*feature }));
+        }
+    }
+    [flight, right]
+}
+
+/// Configuration of a stereo pair.
+pub(super) fn stereo_config([flight, right]: &[SyntheticFlight; 2], options: EstimatorOptions) -> EstimatorConfig {
+    EstimatorConfig {
+        further_cameras: vec![FurtherCamera { is_matched: true, ..camera_beside(right, MAIN, 1) }],
+        chain_prior: None,
+        ..config(&flight.given_rig, Parameterization::Minimal, options)
+    }
+}
+
+/// Window of a stereo pair, with time offsets.
+pub(super) fn stereo_window(options: EstimatorOptions) -> TestWindow {
+    let flights = stereo_flights(&flight_options(false));
+    let config = EstimatorConfig { estimate_timeshift: true, ..stereo_config(&flights, options) };
+    let [flight, right] = &flights;
+    let test = window_of(flight, &[right], config);
+    let is_matched = |features: &FeatureMap| features.values().filter(|feature| feature.matched.len() > 1).count();
+    assert!(is_matched(&test.window.features[MAIN]) > 20, "matches");
+    test
 }
 
 /// Time of the gimballed camera's images after the rigid one's in [`interleaved_window`].
@@ -171,12 +245,12 @@ pub(super) fn interleaved_window(options: EstimatorOptions, estimate_timeshift: 
     let main = synthetic_tracks(&SyntheticOptions { phase_s: INTERLEAVED_S, ..flight_options(true) });
     let rigid = flight(false);
     let config = EstimatorConfig {
-        rigid_cameras: vec![rigid_camera(&rigid)],
+        further_cameras: vec![rigid_camera(&rigid)],
         frame_camera: Some(1),
         estimate_timeshift,
         ..config(&main.given_rig, Parameterization::Minimal, options)
     };
-    window_of(&main, Some(&rigid), config)
+    window_of(&main, &[&rigid], config)
 }
 
 /// Window of a gimballed or a rigid camera with a changed configuration.
@@ -188,7 +262,7 @@ pub(super) fn changed_window(
     let flight = flight(gimbal);
     let mut config = config(&flight.given_rig, Parameterization::Minimal, options);
     change(&mut config);
-    window_of(&flight, None, config)
+    window_of(&flight, &[], config)
 }
 
 /// Window of a gimballed camera with an IMU on the gimbal, with a changed configuration.
@@ -197,23 +271,24 @@ pub(super) fn gimbal_imu_window(options: EstimatorOptions, change: impl FnOnce(&
     let mut config = config(&flight.given_rig, Parameterization::Minimal, options);
     assert!(config.gimbal_imu.is_some());
     change(&mut config);
-    window_of(&flight, None, config)
+    window_of(&flight, &[], config)
 }
 
-fn window_of(flight: &SyntheticFlight, rigid: Option<&SyntheticFlight>, config: EstimatorConfig) -> TestWindow {
+fn window_of(flight: &SyntheticFlight, further: &[&SyntheticFlight], config: EstimatorConfig) -> TestWindow {
     let parameterization = config.parameterization;
     let setup = Setup::new(config);
     let mut calibration = setup.given_calibration();
     let true_chain = |flight: &SyntheticFlight| flight.true_rig.chain_of_camera("cam0").unwrap();
     calibration.of_mut(MAIN).set_chain(Chain::from_classical(&true_chain(flight), parameterization));
-    if let Some(rigid) = rigid {
-        let mount = Chain::from_classical(&true_chain(rigid), Parameterization::Minimal);
-        calibration.of_mut(1).set_chain(mount);
+    for (camera, further) in (1..).zip(further) {
+        let beside = further.true_rig.base_from_camera(Some("cam0"), "cam1").map(|pose| rigid_chain(&pose));
+        let mount = Chain::from_classical(&beside.unwrap_or_else(|| true_chain(further)), Parameterization::Minimal);
+        calibration.of_mut(camera).set_chain(mount);
     }
     let mut features = vec![FeatureMap::new(); calibration.cameras()];
     let mut frames: Option<Frames> = None;
     // The window's frames lie at the images of this flight.
-    let frame_flight = rigid.filter(|_| setup.config.frame_camera == Some(1)).unwrap_or(flight);
+    let frame_flight = further.first().filter(|_| setup.config.frame_camera == Some(1)).map_or(flight, |rigid| *rigid);
     let spacing = 4;
     let first = 100;
     for slot in 0..6 {
@@ -261,9 +336,10 @@ fn window_of(flight: &SyntheticFlight, rigid: Option<&SyntheticFlight>, config: 
             None => frames = Some(Frames::new(frame)),
             Some(frames) => frames.push(frame),
         }
-        features::observe(&mut features[MAIN], slot, &main.tracks.features);
-        if let Some(rigid) = rigid {
-            features::observe(&mut features[1], slot, &rigid.frames[index].tracks.features);
+        let matched = calibration.matched(MAIN, &main.tracks.matched);
+        features::observe(&mut features[MAIN], slot, &main.tracks.features, matched);
+        for (camera, further) in (1..).zip(further) {
+            features::observe(&mut features[camera], slot, &further.frames[index].tracks.features, &[]);
         }
     }
     let frames = frames.expect("six frames");

@@ -30,6 +30,7 @@ fn windows() -> Vec<(&'static str, TestWindow)> {
         ("rigid", fixture::window(Parameterization::Minimal, false, options)),
         ("cluster", fixture::cluster_window(options, false)),
         ("cluster with clocks", fixture::cluster_window(options, true)),
+        ("mounted on cameras", fixture::mounted_window(options, false)),
         ("interleaved", fixture::interleaved_window(options, true)),
     ];
     let mut frozen = gimbal(Parameterization::Classical);
@@ -53,11 +54,12 @@ fn the_terms_of_the_motions_sum_to_the_calibration_jacobian() {
         let linearized = problem.linearization_point(&estimate);
         let frames = &linearized.frames;
         for camera in 0..problem.cameras.len() {
-            let calibration = linearized.calibration.of(camera);
-            let maps = CameraMaps::new(frames, calibration);
-            let parts = motion_parts(frames, calibration, &maps, problem.layout.joints);
-            let sum = parts.iter().fold(DMatrix::zeros(6 * frames.len(), calibration.dof()), |sum, part| sum + part);
-            let mut whole = DMatrix::zeros(6 * frames.len(), calibration.dof());
+            let sensors = linearized.calibration.sensor_models(camera);
+            let columns = sensors[0].columns;
+            let maps = CameraMaps::new(frames, &linearized.calibration, camera);
+            let parts = motion_parts(frames, &sensors, &maps, problem.layout.joints);
+            let sum = parts.iter().fold(DMatrix::zeros(6 * frames.len(), columns), |sum, part| sum + part);
+            let mut whole = DMatrix::zeros(6 * frames.len(), columns);
             for (slot, map) in maps.calibration.iter().enumerate() {
                 whole.rows_mut(6 * slot, 6).copy_from(map);
             }
@@ -128,7 +130,9 @@ fn gain_of(problem: &Problem<'_>, estimate: &Estimate) -> InformationGain {
 
 #[test]
 fn information_gain_equals_that_of_windows_with_and_without_the_newest_image() {
-    for (name, estimator) in windows() {
+    let mut pair = fixture::stereo_window(EstimatorOptions::default());
+    fixture::marginalize_once(&mut pair);
+    for (name, estimator) in windows().into_iter().chain([("stereo pair", pair)]) {
         let active = estimator.active_tracks();
         let problem = estimator.problem(&active);
         let estimate = estimator.estimate(&active);

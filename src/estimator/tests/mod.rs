@@ -16,6 +16,7 @@ mod preintegration;
 mod sensors;
 mod sliding;
 mod stationary;
+mod stereo;
 mod trouble;
 mod window;
 

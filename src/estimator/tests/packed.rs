@@ -25,6 +25,10 @@ impl StepMeasurements for SyntheticFrame {
     fn features(&self, _: usize) -> &[TrackedFeature] {
         &self.tracks.features
     }
+
+    fn matched(&self, _: usize) -> &[TrackedFeature] {
+        &self.tracks.matched
+    }
 }
 
 /// Packs and unpacks the estimator before each step, with the `past` steps before it, and returns the size of the

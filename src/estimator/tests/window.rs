@@ -33,6 +33,7 @@ pub(super) fn windows() -> Vec<(&'static str, TestWindow)> {
         ("rigid", fixture::window(Parameterization::Minimal, false, quadratic())),
         ("cluster", fixture::cluster_window(quadratic(), false)),
         ("cluster with clocks", fixture::cluster_window(quadratic(), true)),
+        ("mounted on cameras", fixture::mounted_window(quadratic(), false)),
         ("interleaved", fixture::interleaved_window(quadratic(), false)),
         ("interleaved with clocks", fixture::interleaved_window(quadratic(), true)),
         (
@@ -58,7 +59,9 @@ pub(super) fn windows() -> Vec<(&'static str, TestWindow)> {
 
 #[test]
 fn the_gradient_of_every_factor_meets_central_differences() {
-    for (name, mut estimator) in windows() {
+    let mounted = ("mounted on cameras, intrinsics", fixture::mounted_window(quadratic(), true));
+    let pair = ("stereo pair", fixture::stereo_window(quadratic()));
+    for (name, mut estimator) in windows().into_iter().chain([mounted, pair]) {
         // Steps are taken from the first estimates: derivatives equal finite differences only there.
         fixture::disturb(&mut estimator, 0.2);
         fixture::marginalize_once(&mut estimator);

@@ -146,7 +146,8 @@ fn cause(suspected: &[SuspectedParameter], config: &EstimatorConfig) -> String {
                 measures both)"
             .to_owned();
     }
-    let rigid = found.parameter.part.camera().checked_sub(1).and_then(|rigid| config.rigid_cameras.get(rigid));
+    let number = found.parameter.part.camera();
+    let rigid = config.further_cameras.iter().find(|camera| usize::from(camera.number) == number);
     let camera = rigid.map_or("the camera", |rigid| &rigid.key);
     let intrinsics = match found.parameter.quantity {
         Quantity::Readout => {

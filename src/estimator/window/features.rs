@@ -11,11 +11,25 @@ use crate::optimization::{self, CameraPose, Landmark, LandmarkModel, Ray, Triang
 pub(crate) struct Feature {
     /// By ascending slot; the first observation is the anchor's.
     pub(crate) observations: Vec<ObservedPixel<usize>>,
+    /// Observations by the other camera of a stereo pair, by ascending slot; each beside one of the camera itself.
+    pub(crate) matched: Vec<ObservedPixel<usize>>,
     /// Landmark in the anchor's camera, `None` until triangulated.
     pub(crate) landmark: Option<Landmark>,
 }
 
 impl Feature {
+    fn track(&self) -> Track {
+        let seen = |matched: bool| {
+            move |seen: &ObservedPixel<usize>| TrackObservation { slot: seen.view, matched, uv_px: seen.uv_px }
+        };
+        let mut observations: Vec<TrackObservation> = self.observations.iter().map(seen(false)).collect();
+        if !self.matched.is_empty() {
+            observations.extend(self.matched.iter().map(seen(true)));
+            observations.sort_by_key(|observation| (observation.slot, observation.matched));
+        }
+        Track { observations }
+    }
+
     pub(crate) fn observation(&self, slot: usize) -> Option<&ObservedPixel<usize>> {
         self.observations.iter().find(|observation| observation.view == slot)
     }
@@ -23,11 +37,18 @@ impl Feature {
 
 pub(crate) type FeatureMap = BTreeMap<FeatureId, Feature>;
 
-/// Adds the features observed in a frame to the features of the camera; skips non-finite ones.
-pub(crate) fn observe(features: &mut FeatureMap, slot: usize, seen: &[TrackedFeature]) {
+/// Adds the features observed in a frame to the features of the camera; skips non-finite ones. `matched` are those that the
+/// other camera of a pair observes as well.
+pub(crate) fn observe(features: &mut FeatureMap, slot: usize, seen: &[TrackedFeature], matched: &[TrackedFeature]) {
     for tracked in seen {
         if let Some(observation) = tracked.seen_in(slot) {
             features.entry(tracked.id).or_default().observations.push(observation);
+        }
+    }
+    for tracked in matched {
+        let feature = features.get_mut(&tracked.id).filter(|feature| feature.observation(slot).is_some());
+        if let (Some(feature), Some(observation)) = (feature, tracked.seen_in(slot)) {
+            feature.matched.push(observation);
         }
     }
 }
@@ -38,13 +59,14 @@ pub(crate) fn drop_frame(features: &mut FeatureMap, gone: usize, view: &CameraVi
     for feature in features.values_mut() {
         let anchor = feature.observations.first().filter(|first| first.view == gone).map(|first| first.uv_px);
         feature.observations.retain(|observation| observation.view != gone);
+        feature.matched.retain(|observation| observation.view != gone);
         if let Some(uv_px) = anchor {
             feature.landmark = feature.observations.first().and_then(|next| {
                 let (from, to) = (view.pose(gone, &uv_px), view.pose(next.view, &next.uv_px));
                 moved(feature.landmark.as_ref()?, &from, &to)
             });
         }
-        for observation in &mut feature.observations {
+        for observation in feature.observations.iter_mut().chain(&mut feature.matched) {
             if observation.view > gone {
                 observation.view -= 1;
             }
@@ -72,15 +94,19 @@ fn moved(landmark: &Landmark, from: &CameraPose, to: &CameraPose) -> Option<Land
 /// the point out of range or behind a camera.
 pub(crate) fn triangulate(feature: &Feature, view: &CameraView<'_>, options: &EstimatorOptions) -> Option<Landmark> {
     let anchor = feature.observations.first()?;
-    if feature.observations.len() < options.min_observations {
+    // A stereo pair determines the distance in one frame.
+    if feature.matched.is_empty() && feature.observations.len() < options.min_observations {
         return None;
     }
-    let ray = |observation: &ObservedPixel<usize>| {
+    let ray = |view: &CameraView<'_>, observation: &ObservedPixel<usize>| {
         let pose = view.pose(observation.view, &observation.uv_px);
         let direction = pose.rotation * view.bearing(&observation.uv_px, &observation.bearing);
         Ray { centre: pose.position_m, direction }
     };
-    let rays: Vec<Ray> = feature.observations.iter().map(ray).collect();
+    let own = feature.observations.iter().map(|observation| ray(view, observation));
+    let partner = view.partner().into_iter();
+    let matched = partner.flat_map(|view| feature.matched.iter().map(move |observation| ray(view, observation)));
+    let rays: Vec<Ray> = own.chain(matched).collect();
     let limits = TriangulationOptions::of_anchored(options.min_triangulation_angle_rad);
     let point = optimization::triangulate(&rays, &limits)?;
     let camera = view.pose(anchor.view, &anchor.uv_px);
@@ -138,13 +164,11 @@ impl ActiveTracks {
         let mut active = Self::default();
         for (id, feature) in features {
             let Some(landmark) = feature.landmark else { continue };
-            if feature.observations.len() < 2 {
+            if feature.observations.len() + feature.matched.len() < 2 {
                 continue;
             }
-            let track_observation =
-                |seen: &ObservedPixel<usize>| TrackObservation { slot: seen.view, uv_px: seen.uv_px };
             active.ids.push(*id);
-            active.tracks.push(Track { observations: feature.observations.iter().map(track_observation).collect() });
+            active.tracks.push(feature.track());
             active.landmarks.push(landmark);
         }
         active

@@ -62,7 +62,9 @@ impl WindowState {
             .collect();
         let any = clocks.iter().any(|clocks| clocks.count > 0);
         let has_intrinsics = |camera| !calibration.of(camera).intrinsics_columns().is_empty();
-        let exact = layout.moving_rows || calibration.imu().is_some() || (0..calibration.cameras()).any(has_intrinsics);
+        let is_mounted = |camera| calibration.of(camera).base().is_some();
+        let needs_exact = |camera| has_intrinsics(camera) || is_mounted(camera);
+        let exact = layout.moving_rows || calibration.imu().is_some() || (0..calibration.cameras()).any(needs_exact);
         let exact = exact.then(|| {
             Box::new(ExactSource {
                 linearized: (frames.clone(), calibration.clone()),

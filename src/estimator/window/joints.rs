@@ -69,10 +69,10 @@ impl WindowState {
         let sigma = self.visual_model(setup, MAIN).sigma_px;
         let mut state = self.frames[slot].state.clone();
         state.joints_rad = angles_rad.to_vec();
-        let sensor = self.calibration.of(MAIN).sensor_model();
+        let sensor = self.calibration.sensor_model(MAIN);
         let camera_at = |row: f64| camera_pose::at_row(&state, &sensor, row);
         let first_row = camera_at(0.0);
-        let own = CameraMaps::of_sensor(std::slice::from_ref(&state), &sensor).own.remove(0);
+        let own = CameraMaps::of_sensors(std::slice::from_ref(&state), std::slice::from_ref(&sensor)).own.remove(0);
         let by_joints = own.columns(6, joints).into_owned();
         let mut equations = NormalEquations::zeros(Dyn(joints));
         let mut count = 0;

@@ -234,7 +234,8 @@ fn steps_with(samples: &[ImuSample], past: &[&dyn StepMeasurements], imu: Packed
 #[derive(Clone, Debug)]
 struct PackedFeatures {
     features: Vec<PackedFeature>,
-    /// Twice the slot of each observation, plus one if it is copied.
+    /// Twice the slot of each observation, plus one if it is copied; of each feature, those by the other camera of a pair come
+    /// last.
     observations: Vec<u16>,
     /// Copied observations: those missing in the step of their frame.
     own: Vec<ObservedPixel<usize>>,
@@ -245,25 +246,28 @@ struct PackedFeature {
     id: FeatureId,
     landmark: Option<Landmark>,
     count: u32,
+    /// Number of observations by the other camera of a pair, after the `count` own ones.
+    matched: u32,
 }
 
 impl PackedFeatures {
     /// `steps` are the steps of the window's frames, by slot.
     fn new(features: &FeatureMap, steps: &[Option<&dyn StepMeasurements>], camera: usize) -> Self {
-        let count = features.values().map(|feature| feature.observations.len()).sum();
+        let count = features.values().map(|feature| feature.observations.len() + feature.matched.len()).sum();
         let mut packed = Self {
             features: Vec::with_capacity(features.len()),
             observations: Vec::with_capacity(count),
             own: Vec::new(),
         };
         for (id, feature) in features {
-            for observation in &feature.observations {
-                let copied = observation_of(steps, observation.view, camera, *id) != Some(*observation);
+            let own = feature.observations.iter().map(|observation| (false, observation));
+            for (matched, observation) in own.chain(feature.matched.iter().map(|observation| (true, observation))) {
+                let copied = observation_of(steps, observation.view, (camera, matched), *id) != Some(*observation);
                 packed.observations.push(2 * observation.view as u16 + u16::from(copied));
                 packed.own.extend(copied.then_some(*observation));
             }
-            let count = feature.observations.len() as u32;
-            packed.features.push(PackedFeature { id: *id, landmark: feature.landmark, count });
+            let (count, matched) = (feature.observations.len() as u32, feature.matched.len() as u32);
+            packed.features.push(PackedFeature { id: *id, landmark: feature.landmark, count, matched });
         }
         packed
     }
@@ -271,12 +275,15 @@ impl PackedFeatures {
     fn unpacked(&self, steps: &[Option<&dyn StepMeasurements>], camera: usize) -> FeatureMap {
         let (mut observations, mut own) = (self.observations.iter(), self.own.iter());
         let mut feature = |packed: &PackedFeature| {
-            let observation = |place: &u16| match place % 2 {
-                0 => observation_of(steps, usize::from(place / 2), camera, packed.id),
-                _ => own.next().copied(),
+            let mut unpack = |count: u32, matched: bool| -> Vec<ObservedPixel<usize>> {
+                let observation = |place: &u16| match place % 2 {
+                    0 => observation_of(steps, usize::from(place / 2), (camera, matched), packed.id),
+                    _ => own.next().copied(),
+                };
+                observations.by_ref().take(count as usize).filter_map(observation).collect()
             };
-            let observations = observations.by_ref().take(packed.count as usize).filter_map(observation).collect();
-            (packed.id, Feature { observations, landmark: packed.landmark })
+            let (observations, matched) = (unpack(packed.count, false), unpack(packed.matched, true));
+            (packed.id, Feature { observations, matched, landmark: packed.landmark })
         };
         self.features.iter().map(&mut feature).collect()
     }
@@ -289,14 +296,16 @@ impl PackedFeatures {
     }
 }
 
-/// Observation of a feature in the step of the frame at `slot`, `None` without one.
+/// Observation of a feature in the step of the frame at `slot`, by its camera or by the other one of a pair; `None` without
+/// one.
 fn observation_of(
     steps: &[Option<&dyn StepMeasurements>],
     slot: usize,
-    camera: usize,
+    (camera, matched): (usize, bool),
     id: FeatureId,
 ) -> Option<ObservedPixel<usize>> {
-    let features = (*steps.get(slot)?)?.features(camera);
+    let step = (*steps.get(slot)?)?;
+    let features = if matched { step.matched(camera) } else { step.features(camera) };
     let place = features.binary_search_by_key(&id, |feature| feature.id).ok()?;
     features[place].seen_in(slot)
 }

@@ -7,8 +7,8 @@ use crate::estimator::factors::FactorKind;
 use crate::estimator::factors::reprojection::VisualModel;
 use crate::estimator::problem::solver::Solution;
 use crate::estimator::report::{
-    CalibrationEstimate, FeatureCounts, FeatureReport, FrameStateReport, LandmarkReport, ObservationReport, Phase,
-    PoseCovariance, ResidualSummary, StageTimes, StepReport,
+    CalibrationEstimate, FeatureCounts, FeatureReport, FrameStateReport, FurtherCameraEstimate, LandmarkReport,
+    ObservationReport, Phase, PoseCovariance, ResidualSummary, StageTimes, StepReport,
 };
 use crate::estimator::state::calibrations::{Calibrations, MAIN};
 use crate::estimator::step_input::StepInput;
@@ -133,11 +133,15 @@ impl WindowState {
                     chi2: after[number].map_or(0.0, |residual| residual.norm_squared() / model.sigma_px.powi(2)),
                     robust_weight: weights[number],
                 };
+                let seen_by = |matched: bool| {
+                    (0..observations.len()).filter(move |number| observations[*number].matched == matched)
+                };
                 FeatureReport {
                     id: of_camera.ids[index].of_camera(camera),
                     anchor_frame_index: self.frames[observations[0].slot].index,
                     inverse_depth_per_m: landmark.inverse_distance / landmark.bearing.z,
-                    observations: (0..observations.len()).map(observation).collect(),
+                    observations: seen_by(false).map(observation).collect(),
+                    matched: seen_by(true).map(observation).collect(),
                     rejected: checks.rejected[index],
                 }
             }));
@@ -217,7 +221,7 @@ pub(crate) fn calibration_estimate(setup: &Setup, calibration: &Calibrations, si
     } else {
         vec![f64::NAN; parameters.len()]
     };
-    let rigid_cameras = setup.config.rigid_cameras.iter().zip(cameras().skip(1));
+    let further_cameras = setup.config.further_cameras.iter().zip(cameras().skip(1));
     CalibrationEstimate {
         parameterization: chain.parameterization(),
         parameters,
@@ -227,8 +231,16 @@ pub(crate) fn calibration_estimate(setup: &Setup, calibration: &Calibrations, si
         prior_sigmas: calibration.prior_sigmas(),
         classical: chain.to_classical(),
         margins: chain.margins(),
-        rigid_cameras: rigid_cameras
-            .map(|(camera, calibration)| (camera.key.clone(), calibration.imu_from_camera(&[])))
+        further_cameras: further_cameras
+            .map(|(camera, calibration)| FurtherCameraEstimate {
+                key: camera.key.clone(),
+                number: camera.number,
+                base: camera.base.map(|base| match base.checked_sub(1) {
+                    None => setup.config.key.clone(),
+                    Some(further) => setup.config.further_cameras[further].key.clone(),
+                }),
+                base_from_camera: calibration.imu_from_camera(&[]),
+            })
             .collect(),
     }
 }

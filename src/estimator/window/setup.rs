@@ -74,10 +74,11 @@ impl Setup {
         let main = Calibration::new(&config.chain, config.parameterization, given(MAIN), config.calibrate, encoders);
         let has_readings = main.joint_count() > 0 && encoders;
         let main = self.with_sensors(main, MAIN, config.timeshift_s, has_readings);
-        let rigid = config.rigid_cameras.iter().enumerate().map(|(index, camera)| {
-            let mount = rigid_chain(&camera.imu_from_camera);
+        let rigid = config.further_cameras.iter().enumerate().map(|(index, camera)| {
+            let mount = rigid_chain(&camera.base_from_camera);
             let rigid = Calibration::new(&mount, Parameterization::Minimal, given(index + 1), config.calibrate, false);
-            self.with_sensors(rigid, index + 1, camera.timeshift_s, false)
+            let rigid = self.with_sensors(rigid, index + 1, camera.timeshift_s, false);
+            rigid.of_camera(index + 1, camera.number).mounted_on(camera.base)
         });
         let estimated = config.calibrate && config.estimate_imu_intrinsics;
         Calibrations::new(main, rigid)
@@ -109,6 +110,7 @@ impl Setup {
             columns.extend(SensorColumn::gimbal_imu(imu.timeshift_s));
         }
         let gimbal_imu = config.gimbal_imu.as_ref().filter(|_| camera == MAIN).map(|imu| imu.camera_from_imu);
+        let calibration = calibration.with_partner(config.partner(camera));
         calibration.with_sensors(columns).with_given_readout(sensor.readout_s).with_given_gimbal_imu(gimbal_imu)
     }
 
@@ -121,7 +123,7 @@ impl Setup {
     fn has_rolling_shutter(&self) -> bool {
         let config = &self.config;
         let given = |camera: usize| config.sensor(camera).readout_s != 0.0;
-        (config.estimate_readout && config.calibrate) || (0..=config.rigid_cameras.len()).any(given)
+        (config.estimate_readout && config.calibrate) || (0..=config.further_cameras.len()).any(given)
     }
 
     /// Motion of the vehicle near a stamp, from the samples before and after it and the times of the images; `None` if

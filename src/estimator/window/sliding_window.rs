@@ -160,7 +160,8 @@ impl SlidingWindow {
         window.frames.push(Frame { keyframe: false, ..frame.with_gimbal_motion(predicted.motion) });
         let slot = window.frames.newest_slot();
         for (camera, features) in window.features.iter_mut().enumerate() {
-            features::observe(features, slot, input.features(camera));
+            let matched = window.calibration.matched(camera, input.matched(camera));
+            features::observe(features, slot, input.features(camera), matched);
         }
         window.align_newest_joints(setup);
         Ok(())

@@ -19,7 +19,7 @@ use crate::optimization::Landmark;
 #[derive(Clone, Debug)]
 pub(crate) struct WindowState {
     pub(crate) frames: Frames,
-    /// Features by camera; cameras have no common features.
+    /// Features by camera, with their observations by the other camera of its pair.
     pub(crate) features: Vec<FeatureMap>,
     pub(crate) calibration: Calibrations,
     /// Marginalization prior, `None` before the first marginalization.
@@ -33,8 +33,8 @@ pub(crate) struct WindowState {
 impl WindowState {
     /// Camera at the current estimate.
     pub(crate) fn view<'v>(&'v self, setup: &'v Setup, camera: usize) -> CameraView<'v> {
-        let states = self.frames.iter().map(|frame| frame.state.clone()).collect();
-        CameraView::of_states(states, self.calibration.of(camera), setup.config.model(camera))
+        let states: Vec<_> = self.frames.iter().map(|frame| frame.state.clone()).collect();
+        CameraView::new(states, &self.calibration, camera, &|camera| setup.config.model(camera))
     }
 
     /// Least-squares problem of the window with the tracks of each camera; trailing cameras without tracks may be
@@ -44,7 +44,7 @@ impl WindowState {
         let layout = frame::layout(&self.frames, self.calibration.dof());
         let start = layout.calibration().start;
         let factors = |camera: usize| {
-            let columns = self.calibration.columns(camera);
+            let columns = self.calibration.pose_columns(camera);
             CameraFactors {
                 visual: self.visual_model(setup, camera),
                 tracks: active.get(camera).map_or(&[], |active| &active.tracks),

@@ -33,6 +33,7 @@ pub(super) fn stage_results(recording: &Recording, run: &RunRecord, path: &Path)
         world_from_run: run.alignment.unwrap_or_else(RigidTransform::identity),
         trajectory: Vec::new(),
         path_due_ns: i64::MIN,
+        main_camera: &run.camera_key,
         series: Series::new(run, &recording.rig),
         epoch_ns: recording.epoch_ns,
     };
@@ -52,6 +53,8 @@ struct Results<'a> {
     trajectory: Vec<(i64, RigidTransform)>,
     /// Stamp of the next path message.
     path_due_ns: i64,
+    /// Key of the main camera, whose frame is `camera`.
+    main_camera: &'a str,
     series: Series<'a>,
     epoch_ns: i64,
 }
@@ -97,7 +100,7 @@ impl<'a> Results<'a> {
         Ok(())
     }
 
-    /// Frames from the world through the run's world and the IMU along the chain to the camera, and the rigid cameras.
+    /// Frames from the world through the run's world and the IMU along the chain to the camera, and the other cameras.
     fn transforms(&self, chain: &ClassicalChain, step: &StepRecord) -> Vec<NamedTransform> {
         let Some(newest) = step.report.newest() else { return Vec::new() };
         let named = |parent: &str, child: &str, pose| NamedTransform {
@@ -126,8 +129,13 @@ impl<'a> Results<'a> {
             }
             transforms.push(named(&parent, "camera", chain.effector_from_camera));
         }
-        for (key, imu_from_camera) in &step.report.calibration.rigid_cameras {
-            transforms.push(named("imu", key, *imu_from_camera));
+        for camera in &step.report.calibration.further_cameras {
+            let parent = match camera.base.as_deref() {
+                None => "imu",
+                Some(base) if base == self.main_camera => "camera",
+                Some(base) => base,
+            };
+            transforms.push(named(parent, &camera.key, camera.base_from_camera));
         }
         transforms
     }

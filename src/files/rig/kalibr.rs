@@ -9,7 +9,7 @@ use super::read;
 use crate::files::FileError;
 use crate::files::located::Located;
 use crate::geometry::RigidTransform;
-use crate::sensors::{CameraMount, RequiredAccuracy, Rig};
+use crate::sensors::{CameraMount, CameraRig, ChainPrior, RequiredAccuracy, Rig};
 
 /// Usual names of the IMU file.
 const IMU_FILES: [&str; 4] = ["imu.yaml", "imu0.yaml", "imu-calib.yaml", "kalibr_imu_chain.yaml"];
@@ -55,7 +55,10 @@ pub(crate) fn read_camera_chain(
         let camera_from_imu = camera_from_imu(&camera, previous_from_imu)?;
         previous_from_imu = Some(camera_from_imu);
         let imu_from_camera = camera_from_imu.inverse();
-        cameras.push(read::read_camera_as(&camera, &key, CameraMount::Static { imu_from_camera }, facts)?);
+        let relative_prior =
+            (!cameras.is_empty() && camera.field("T_cn_cnm1").is_present()).then_some(ChainPrior::RELATIVE);
+        let read = read::read_camera_as(&camera, &key, CameraMount::Static { imu_from_camera }, facts)?;
+        cameras.push(CameraRig { relative_prior, ..read });
     }
     Ok(Rig {
         name: name.to_owned(),

@@ -75,9 +75,11 @@ const CAMERA: Keys = Keys {
         "line_delay",
         "intrinsics_sigma",
         "T_cam_imu",
+        "T_cn_cnm1",
+        "T_cn_cnm1_prior",
         "mask",
     ],
-    unused: &["cam_overlaps", "T_cn_cnm1", "model"],
+    unused: &["cam_overlaps", "model"],
 };
 const INTRINSICS_SIGMA: Keys = Keys { read: &["focal", "centre", "distortion"], unused: &[] };
 /// The gyroscope's dependence on acceleration and the positions of the accelerometers' axes are not used.
@@ -201,14 +203,17 @@ fn check_imu(imu: &Located, path: &str, keys: &Keys, found: &mut Found) {
 }
 
 fn check_camera(camera: &Located, path: &str, found: &mut Found) {
+    if path == "cam0" && camera.get("T_cn_cnm1").is_some() {
+        // There is no camera before it.
+        found.unused.push(format!("{path}.T_cn_cnm1"));
+    }
     check_mapping(camera, path, &CAMERA, found);
     if camera.get("mount").is_none() {
         // A camera chain of OpenVINS has the inverse transform.
         found.unknown.retain(|(field, ..)| field.strip_suffix(".T_imu_cam") != Some(path));
     }
-    if camera.get("T_cam_imu").is_none() {
-        // The pose relative to the previous camera is used.
-        found.unused.retain(|key| key.strip_suffix(".T_cn_cnm1") != Some(path));
+    if let Some(prior) = camera.get("T_cn_cnm1_prior") {
+        check_mapping(prior, &format!("{path}.T_cn_cnm1_prior"), &PRIOR, found);
     }
     if let Some(sigma) = camera.get("intrinsics_sigma") {
         check_mapping(sigma, &format!("{path}.intrinsics_sigma"), &INTRINSICS_SIGMA, found);

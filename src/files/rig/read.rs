@@ -7,6 +7,7 @@ use super::mask;
 use super::sensor;
 use crate::camera::{CameraError, CameraModel};
 use crate::files::FileError;
+use crate::geometry::RigidTransform;
 use crate::gimbal::{ClassicalChain, InverseChain, ParameterNames};
 use crate::sensors::{
     AssumedField, CameraMount, CameraRig, ChainPrior, GimbalImuRig, GimbalRig, ImuNoise, ImuRig, Joint, LeverArm,
@@ -46,8 +47,11 @@ pub(crate) fn read_rig(root: &Field<'_>, default_name: &str, facts: &dyn CameraF
     if keys.is_empty() {
         return Err(root.field("cam0").unexpected("at least one camera, cam0"));
     }
-    let cameras: Vec<CameraRig> =
-        keys.iter().map(|key| read_camera(&root.field(key), key, facts)).collect::<Result<_, _>>()?;
+    let mut cameras: Vec<CameraRig> = Vec::new();
+    for key in &keys {
+        let camera = read_camera(&root.field(key), key, &cameras, facts)?;
+        cameras.push(camera);
+    }
     if gimbal.is_none()
         && let Some(camera) = cameras.iter().find(|camera| camera.mount == CameraMount::Gimbal)
     {
@@ -191,14 +195,79 @@ fn read_gimbal_imu(root: &Field<'_>, vehicle: &ImuRig, has_gimbal: bool) -> Resu
     Ok(Some(GimbalImuRig { sensor, camera_from_imu: imu.field("T_cam_imu").transform()?, timeshift_s }))
 }
 
-fn read_camera(camera: &Field<'_>, key: &str, facts: &dyn CameraFacts) -> Result<CameraRig, FileError> {
+fn read_camera(
+    camera: &Field<'_>,
+    key: &str,
+    earlier: &[CameraRig],
+    facts: &dyn CameraFacts,
+) -> Result<CameraRig, FileError> {
     const MOUNTS: &str = "gimbal or static";
-    let mount = match camera.field("mount").text(MOUNTS)? {
-        "gimbal" => CameraMount::Gimbal,
-        "static" => CameraMount::Static { imu_from_camera: camera.field("T_cam_imu").transform()?.inverse() },
+    let on_gimbal = match camera.field("mount").text(MOUNTS)? {
+        "gimbal" => true,
+        "static" => false,
         _ => return Err(camera.field("mount").unexpected(MOUNTS)),
     };
-    read_camera_as(camera, key, mount, facts)
+    let relative = camera.field("T_cn_cnm1");
+    let before = earlier.iter().rfind(|other| other.is_on_gimbal() == on_gimbal);
+    // The first camera of a mount has none before it.
+    let before = before.filter(|_| on_gimbal || relative.is_present());
+    let before_from_camera = before.map(|_| relative.transform()).transpose()?.map(|pose| pose.inverse());
+    let (mount, first_from_camera) = match before.zip(before_from_camera) {
+        Some((before, pose)) => match &before.mount {
+            CameraMount::Gimbal => (CameraMount::Gimbal, before.first_from_camera * pose),
+            CameraMount::Static { imu_from_camera: imu_from_before } => {
+                let imu_from_camera = *imu_from_before * pose;
+                agree(camera, &imu_from_camera)?;
+                (CameraMount::Static { imu_from_camera }, RigidTransform::identity())
+            }
+        },
+        None if on_gimbal => (CameraMount::Gimbal, RigidTransform::identity()),
+        None => {
+            let imu_from_camera = camera.field("T_cam_imu").transform()?.inverse();
+            (CameraMount::Static { imu_from_camera }, RigidTransform::identity())
+        }
+    };
+    let relative_prior = before.map(|_| read_relative_prior(camera)).transpose()?;
+    Ok(CameraRig { first_from_camera, relative_prior, ..read_camera_as(camera, key, mount, facts)? })
+}
+
+/// Requires that `T_cam_imu`, if it is given beside `T_cn_cnm1`, is the same pose.
+fn agree(camera: &Field<'_>, imu_from_camera: &RigidTransform) -> Result<(), FileError> {
+    /// Largest difference in metres and radians: digits that were cut off, and no other calibration.
+    const ROUNDING: f64 = 0.005;
+    let given = camera.field("T_cam_imu");
+    if !given.is_present() {
+        return Ok(());
+    }
+    let difference = given.transform()? * *imu_from_camera;
+    let (shift_m, rotation_rad) = (difference.translation_m.norm(), difference.rotation.angle());
+    if shift_m.max(rotation_rad) <= ROUNDING {
+        return Ok(());
+    }
+    let problem = format!(
+        "differs by {:.1} mm and {:.2}° from the pose by T_cn_cnm1 and the camera before; remove one of them",
+        shift_m * 1e3,
+        rotation_rad.to_degrees()
+    );
+    Err(given.error(problem))
+}
+
+/// Bounds of the errors of `T_cn_cnm1`.
+fn read_relative_prior(camera: &Field<'_>) -> Result<ChainPrior, FileError> {
+    match camera.field("T_cn_cnm1_prior").optional() {
+        Some(prior) => read_bounds(&prior),
+        None => Ok(ChainPrior::RELATIVE),
+    }
+}
+
+/// Bounds of the errors of a translation and of a rotation.
+fn read_bounds(prior: &Field<'_>) -> Result<ChainPrior, FileError> {
+    let rotation_bound_rad = prior.field("rotation_bound").not_negative("a bound in rad")?;
+    prior.field("rotation_bound").in_radians(rotation_bound_rad, std::f64::consts::PI)?;
+    Ok(ChainPrior {
+        translation_bound_m: prior.field("translation_bound").not_negative("a bound in m")?,
+        rotation_bound_rad,
+    })
 }
 
 /// Reads the fields common to rigs of this program and Kalibr's files.
@@ -225,6 +294,8 @@ pub(super) fn read_camera_as(
     Ok(CameraRig {
         key: key.to_owned(),
         mount,
+        first_from_camera: RigidTransform::identity(),
+        relative_prior: None,
         rate_hz,
         model,
         mask,
@@ -338,12 +409,7 @@ fn read_gimbal(gimbal: &Field<'_>) -> Result<GimbalRig, FileError> {
     if let Some(sigma_rad) = encoder_sigma_rad {
         gimbal.field("encoder_sigma").in_radians(sigma_rad, MAX_SIGMA_RAD)?;
     }
-    let prior = gimbal.field("prior");
-    let prior = ChainPrior {
-        translation_bound_m: prior.field("translation_bound").not_negative("a bound in m")?,
-        rotation_bound_rad: prior.field("rotation_bound").not_negative("a bound in rad")?,
-    };
-    gimbal.field("prior").field("rotation_bound").in_radians(prior.rotation_bound_rad, std::f64::consts::PI)?;
+    let prior = read_bounds(&gimbal.field("prior"))?;
     let parameterization = gimbal.field("parameterization");
     let switches_parameterization =
         match parameterization.is_present().then(|| parameterization.text("auto")).transpose()? {

@@ -662,3 +662,52 @@ fn a_mask_lies_beside_the_rig_or_is_attached_with_it() {
     let log = FlightLog::open(&path).unwrap();
     assert_eq!(Rig::for_log(&log, None).unwrap().cameras[0].mask, rig.cameras[0].mask);
 }
+
+#[test]
+fn a_camera_may_be_calibrated_relative_to_the_one_before_it() {
+    use crate::geometry::RigidTransform;
+    use crate::sensors::ChainPrior;
+    use crate::simulation::{SyntheticMount, SyntheticOptions, synthetic_tracks};
+    let rig = |mount| {
+        let options = SyntheticOptions { mount, duration_s: 0.1, beside: true, ..SyntheticOptions::default() };
+        synthetic_tracks(&options).given_rig
+    };
+    for mount in [SyntheticMount::Static, SyntheticMount::Gimbal] {
+        let mut rig = rig(mount);
+        rig.cameras[1].relative_prior = Some(ChainPrior { translation_bound_m: 0.002, rotation_bound_rad: 0.01 });
+        let text = rig.to_yaml();
+        let read = parse(&text).unwrap();
+        assert_eq!(read.cameras[1].relative_prior, rig.cameras[1].relative_prior);
+        let pose = |rig: &Rig| rig.base_from_camera(Some("cam0"), "cam1").unwrap();
+        assert!(pose(&read).minus(&pose(&rig)).norm() < 1e-9);
+        assert_eq!(read.base_of(&read.cameras[1]).map(|base| base.key.as_str()), Some("cam0"));
+        assert_eq!(read.stereo_partner(&read.cameras[0]).is_some(), mount == SyntheticMount::Static);
+        assert_eq!((read.camera_number("cam0"), read.camera_number("cam1")), (0, 1));
+        let chains = ["cam0", "cam1"].map(|key| read.chain_of_camera(key).unwrap());
+        let angles = vec![0.2; chains[0].joint_count()];
+        let [first, second] = chains.map(|chain| chain.imu_from_camera(&angles));
+        assert!((first.inverse() * second).minus(&pose(&rig)).norm() < 1e-9);
+        let mut moved = read.clone();
+        let change = RigidTransform::new(pose(&read).rotation, Vector3::new(0.0, 0.3, 0.0));
+        moved.set_base_from_camera(Some("cam0"), "cam1", change);
+        assert!(pose(&moved).minus(&change).norm() < 1e-9);
+
+        let lines: Vec<&str> = text.lines().collect();
+        let at = lines.iter().position(|line| line.contains("T_cn_cnm1:")).unwrap();
+        let without = [&lines[..at], &lines[at + 6..]].concat().join("\n");
+        if mount == SyntheticMount::Gimbal {
+            let message = parse(&without).unwrap_err();
+            assert!(message.starts_with("cam1.T_cn_cnm1: "), "{message}");
+        } else {
+            assert_eq!(parse(&without).unwrap().cameras[1].relative_prior, None);
+            let first = lines.iter().rposition(|line| line.contains("T_cam_imu:")).unwrap();
+            let mut wrong: Vec<String> = lines.iter().map(|line| (*line).to_owned()).collect();
+            wrong.drain(first + 1..first + 5);
+            for row in ["0.0, 0.0, 0.0, 1.0", "0.0, 0.0, 1.0, 0.0", "0.0, 1.0, 0.0, 0.0", "1.0, 0.0, 0.0, 0.0"] {
+                wrong.insert(first + 1, format!("  - [{row}]"));
+            }
+            let message = parse(&wrong.join("\n")).unwrap_err();
+            assert!(message.contains("T_cam_imu: differs by") && message.contains("T_cn_cnm1"), "{message}");
+        }
+    }
+}

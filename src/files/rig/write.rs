@@ -10,8 +10,8 @@ use crate::files::yaml::{number, numbers, text};
 use crate::geometry::RigidTransform;
 use crate::gimbal::DhLink;
 use crate::sensors::{
-    AssumedField, CameraMount, CameraRig, GimbalImuRig, GimbalRig, ImuIntrinsics, ImuRig, LeverArm, RequiredAccuracy,
-    Rig,
+    AssumedField, CameraMount, CameraRig, ChainPrior, GimbalImuRig, GimbalRig, ImuIntrinsics, ImuRig, LeverArm,
+    RequiredAccuracy, Rig,
 };
 
 impl Rig {
@@ -50,7 +50,7 @@ impl Rig {
             write_transform(&mut out, 1, "T_cam_imu", camera_from_imu);
         }
         for camera in &self.cameras {
-            write_camera(&mut out, camera);
+            write_camera(&mut out, self, camera);
         }
         if let Some(gimbal) = &self.gimbal {
             write_gimbal(&mut out, gimbal);
@@ -121,7 +121,7 @@ fn write_imu_intrinsics(out: &mut String, intrinsics: &ImuIntrinsics) {
     write_matrix(out, 2, "M", &kalibr.accelerometer_m);
 }
 
-fn write_camera(out: &mut String, camera: &CameraRig) {
+fn write_camera(out: &mut String, rig: &Rig, camera: &CameraRig) {
     line(out, 0, &camera.key, "");
     let mount = if camera.mount == CameraMount::Gimbal { "gimbal" } else { "static" };
     line(out, 1, "mount", mount);
@@ -151,6 +151,17 @@ fn write_camera(out: &mut String, camera: &CameraRig) {
     }
     if let CameraMount::Static { imu_from_camera } = &camera.mount {
         write_transform(out, 1, "T_cam_imu", &imu_from_camera.inverse());
+    }
+    if let Some(prior) = &camera.relative_prior
+        && let Some(before) = rig.camera_before(camera)
+        && let Some(before_from_camera) = rig.base_from_camera(Some(&before.key), &camera.key)
+    {
+        write_transform(out, 1, "T_cn_cnm1", &before_from_camera.inverse());
+        if *prior != ChainPrior::RELATIVE {
+            let [translation, rotation] = [prior.translation_bound_m, prior.rotation_bound_rad].map(number);
+            let bounds = format!("{{translation_bound: {translation}, rotation_bound: {rotation}}}");
+            line(out, 1, "T_cn_cnm1_prior", &bounds);
+        }
     }
 }
 

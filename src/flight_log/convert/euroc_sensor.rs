@@ -16,7 +16,9 @@ use crate::files::limits::LINE_BYTES;
 use crate::files::yaml::without_opencv_head;
 use crate::flight_log::container::file::kind_of;
 use crate::geometry::{RigidTransform, seconds_from_ns};
-use crate::sensors::{CameraMount, CameraRig, GimbalRig, ImuIntrinsics, ImuNoise, ImuRig, RequiredAccuracy, Rig};
+use crate::sensors::{
+    CameraMount, CameraRig, ChainPrior, GimbalRig, ImuIntrinsics, ImuNoise, ImuRig, RequiredAccuracy, Rig,
+};
 use crate::text::without_bom;
 
 pub(super) const IMU_TOPIC: &str = "/imu0";
@@ -216,6 +218,9 @@ fn camera_rig(
     let measured_hz = camera.stamps_ns.len().saturating_sub(1) as f64 / span_s;
     Ok(CameraRig {
         key: camera.key.clone(),
+        first_from_camera: RigidTransform::identity(),
+        // Further cameras of a folder were calibrated with the first one.
+        relative_prior: (camera.key != "cam0").then_some(ChainPrior::RELATIVE),
         mount: CameraMount::Static { imu_from_camera: body_from_imu.inverse() * file.body_from_sensor()? },
         topic: image_topic(&camera.key),
         use_log_time: false,

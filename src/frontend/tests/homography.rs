@@ -163,11 +163,15 @@ impl Scene {
         Rotation3::new(axis * self.motion_scale)
     }
 
+    /// Translation `camera_from_plane` of image `index`, in distances of the plane.
+    pub(crate) fn translation(&self, index: usize) -> Vector3<f64> {
+        let phase = index as f64;
+        Vector3::new((phase / 9.0).sin(), (phase / 7.0).cos(), (phase / 6.0).sin()) * (0.06 * self.motion_scale)
+    }
+
     /// Maps pixels of image `index` to texture pixels.
     pub(crate) fn texture_from_image(&self, index: usize) -> Matrix3<f64> {
-        let phase = index as f64;
-        let shift =
-            Vector3::new((phase / 9.0).sin(), (phase / 7.0).cos(), (phase / 6.0).sin()) * (0.06 * self.motion_scale);
+        let shift = self.translation(index);
         let mut camera_from_plane = self.camera_from_plane(index).into_inner();
         // The plane z = 1: its points (x, y, 1) go to R·(x, y, 1) + t.
         camera_from_plane.column_mut(2).axpy(1.0, &shift, 1.0);

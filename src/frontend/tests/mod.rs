@@ -8,6 +8,7 @@ mod perspective;
 mod products;
 mod readout;
 mod reference;
+mod stereo;
 
 use nalgebra::Vector2;
 

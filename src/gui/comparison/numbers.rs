@@ -119,7 +119,7 @@ pub(super) fn divergences_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, reference:
                 let name = format!("{what} of {own} from {other}");
                 time_button(ui, ctx, Some(stamp_ns), &name);
                 if let Some(frame) = run.index_at(stamp_ns).and_then(|step| run.steps.get(step)) {
-                    let text = format!("frame {}", frame.report.frame_index);
+                    let text = format!("frame {}", frame.report.frame_name());
                     ui.label(RichText::new(text).color(theme.text_weak));
                 }
             });

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::estimator::rigid_columns;
+use crate::estimator::pose_columns;
 use crate::gimbal::{NearestForm, ParameterId, Parameterization};
 use crate::gui::derived::chain_values::{ParameterValues, parameter_values, principal_values, unwrap_towards};
 use crate::gui::derived::follow::Follower;
@@ -125,8 +125,8 @@ impl ConvertedHistory {
             self.stamps_ns.push(step.report.stamp_ns);
             let calibration = &step.report.calibration;
             let mut values = parameter_values(&calibration.classical, &conversion);
-            let rigid = (1..).zip(&calibration.rigid_cameras);
-            values.extend(rigid.flat_map(|(camera, (_, pose))| rigid_columns(camera, pose)));
+            let rigid = calibration.further_cameras.iter();
+            values.extend(rigid.flat_map(|camera| pose_columns(camera.number, &camera.base_from_camera)));
             unwrap_towards(&mut values, &self.last);
             for (parameter, value) in &values {
                 let column = self.values.entry(*parameter).or_default();

@@ -62,6 +62,8 @@ impl SolvedMark {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct ImageModel {
     pub(super) frame_index: usize,
+    /// [`StepReport::frame_name`](crate::estimator::StepReport::frame_name).
+    pub(super) frame_name: String,
     pub(super) stamp_ns: i64,
     pub(super) phase: Phase,
     pub(super) keyframe: bool,
@@ -118,6 +120,7 @@ impl ImageModel {
             .collect();
         Some(Self {
             frame_index: report.frame_index,
+            frame_name: report.frame_name(),
             stamp_ns: report.stamp_ns,
             phase: report.phase,
             keyframe: report.keyframe,
@@ -134,7 +137,7 @@ impl ImageModel {
     /// The parts of the caption, the most important first: `frame 120`, `6.000 s`, `reprojection RMS 0.40 px`,
     /// `tracked 98`, `keyframe`, `before the solve 0.93 px`, `median 0.12 px`, `new 12`, `lost 9`, `rejected 5`, `sliding 14`.
     fn caption_parts(&self) -> Vec<String> {
-        let mut parts = vec![format!("frame {}", self.frame_index), format!("{:.3} s", seconds_from_ns(self.stamp_ns))];
+        let mut parts = vec![format!("frame {}", self.frame_name), format!("{:.3} s", seconds_from_ns(self.stamp_ns))];
         let tracking = self.phase == Phase::Tracking;
         if tracking {
             parts.push(format!("reprojection RMS {:.2} px", self.rms_after_px));

@@ -63,7 +63,7 @@ impl InspectorPanel {
             let title = format!("Block: feature {} × {}", id.0, ctx.names().name(parameter));
             section_ui(ui, ctx.theme, figure, &title, |ui| links::block_ui(ui, ctx, run, step, id, parameter));
         }
-        let title = format!("Frame {}", step.report.frame_index);
+        let title = format!("Frame {}", step.report.frame_name());
         section_ui(ui, ctx.theme, figure, &title, |ui| step::frame_ui(ui, ctx, run, step));
         section_ui(ui, ctx.theme, figure, "Events", |ui| step::events_ui(ui, ctx.theme, &step.report));
         section_ui(ui, ctx.theme, figure, "Solver iterations", |ui| step::iterations_ui(ui, ctx.theme, &step.report));

@@ -48,7 +48,7 @@ pub(super) struct JacobianModel {
 
 /// Cameras of a run in the order of its features, the main camera first.
 pub(in crate::gui) fn cameras<'a>(rig: &'a Rig, run: &RunRecord, step: &StepRecord) -> Vec<&'a CameraModel> {
-    let rigid = step.report.calibration.rigid_cameras.iter().map(|(key, _)| key);
+    let rigid = step.report.calibration.further_cameras.iter().map(|camera| &camera.key);
     let keys = std::iter::once(&run.camera_key).chain(rigid);
     keys.map_while(|key| rig.camera(key).ok()).map(|camera| &camera.model).collect()
 }

@@ -152,7 +152,7 @@ fn run_on(flight: &SyntheticFlight, name: &str) -> RunRecord {
             gimbal_imu: &[],
             joint_angles: joint_angles.as_ref(),
             tracks: &frame.tracks,
-            rigid_tracks: &[],
+            further_tracks: &[],
         });
         let rank = report.linearization.take().and_then(|linearization| {
             let angles: Vec<&[f64]> = report.window.iter().map(|frame| frame.joint_angles_rad.as_slice()).collect();

@@ -329,7 +329,7 @@ impl TimelinePanel {
 fn value_text(ctx: &PanelContext<'_>) -> String {
     let step = ctx.selected_step().map(|(_, step)| step);
     let cursor = Some(format!("cursor {} s", seconds(ctx.cursor_ns)));
-    let frame = step.map(|step| format!("frame {}", step.report.frame_index));
+    let frame = step.map(|step| format!("frame {}", step.report.frame_name()));
     let range = ctx.selection.visible_ns;
     let visible = range.map(|(begin, end)| format!("visible {} to {} s", seconds(begin), seconds(end)));
     [cursor, frame, visible].into_iter().flatten().collect::<Vec<_>>().join(", ")

@@ -109,7 +109,7 @@ fn time_ui(ui: &mut Ui, ctx: &PanelContext<'_>) {
     if let Some(step) = run.and_then(|run| run.step_at(ctx.cursor_ns)) {
         ui.add_space(8.0);
         ui.label(RichText::new("frame").color(theme.text_weak)).on_hover_text(window::FRAME.meaning);
-        let number = RichText::new(step.report.frame_index.to_string()).monospace().color(theme.text_strong);
+        let number = RichText::new(step.report.frame_name()).monospace().color(theme.text_strong);
         ui.label(number).on_hover_text(window::FRAME.meaning);
     }
     if ctx.playback.solver.is_some()

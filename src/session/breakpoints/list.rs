@@ -178,7 +178,7 @@ impl Breakpoints {
         let Some((breakpoint, run)) = self.list.get(hit.breakpoint).zip(recording.runs.get(hit.run)) else {
             return String::new();
         };
-        let frame = run.steps.get(hit.step).map_or(0, |step| step.report.frame_index);
+        let frame = run.steps.get(hit.step).map_or_else(String::new, |step| step.report.frame_name());
         let time_s = crate::geometry::seconds_from_ns(hit.stamp_ns);
         let values = self.values_at(recording, hit);
         let values: Vec<String> = values.iter().map(NamedValue::to_string).collect();

@@ -61,6 +61,7 @@ impl AlteredMeasurements {
         tracks.features.iter().any(|feature| gone(feature.id)).then(|| {
             let mut kept = tracks.clone();
             kept.features.retain(|feature| !gone(feature.id));
+            kept.matched.retain(|feature| !gone(feature.id));
             kept
         })
     }

@@ -1,14 +1,15 @@
 //! The estimator's configuration from a rig and a run specification.
 
 use super::stopwatch::clock_ms;
-use crate::estimator::{EstimatorConfig, EstimatorOptions, RigidCamera};
+use crate::estimator::{EstimatorConfig, EstimatorOptions, FurtherCamera};
 use crate::flight_log::LogError;
 use crate::gimbal::{Parameterization, auto_parameterization};
-use crate::sensors::Rig;
-use crate::session::plan::{ParameterizationChoice, RunCameras, RunSpec, SessionError, cameras_of_run};
+use crate::sensors::{CameraRig, Rig};
+use crate::session::plan::{ParameterizationChoice, RunSpec, SessionError, cameras_of_run};
 
 pub(in crate::session) fn estimator_config(rig: &Rig, spec: &RunSpec) -> Result<EstimatorConfig, SessionError> {
-    let RunCameras { main: camera, rigid } = cameras_of_run(rig, spec)?;
+    let cameras = cameras_of_run(rig, spec)?;
+    let camera = cameras.main;
     let chain = rig.chain_of_camera(&camera.key).unwrap_or_default();
     let parameterization = match spec.parameterization {
         ParameterizationChoice::Auto | ParameterizationChoice::Cluster => auto_parameterization(&chain),
@@ -18,6 +19,9 @@ pub(in crate::session) fn estimator_config(rig: &Rig, spec: &RunSpec) -> Result<
         ParameterizationChoice::Poe => Parameterization::Poe,
     };
     let configuration = EstimatorConfig::for_camera(rig, &camera.key, parameterization).map_err(LogError::from)?;
+    let cameras: Vec<&CameraRig> = cameras.iter().collect();
+    let further = (1..cameras.len()).map(|index| FurtherCamera::of_rig(rig, &cameras[..index], cameras[index]));
+    let further_cameras = further.flatten().collect();
     let standard = EstimatorOptions::default();
     let options = EstimatorOptions {
         window: spec.window,
@@ -36,7 +40,7 @@ pub(in crate::session) fn estimator_config(rig: &Rig, spec: &RunSpec) -> Result<
         estimate_imu_intrinsics: spec.imu_intrinsics,
         gimbal_imu: configuration.gimbal_imu.clone().filter(|_| spec.gimbal_imu),
         estimate_gimbal_imu: spec.gimbal_imu_axes,
-        rigid_cameras: rigid.into_iter().filter_map(|camera| RigidCamera::of_rig(rig, camera)).collect(),
+        further_cameras,
         options,
         clock_ms,
         ..configuration

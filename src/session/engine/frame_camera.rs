@@ -55,16 +55,15 @@ impl FrameCamera {
             Ok(Stamps(stamps.take(COMPARED_IMAGES).collect()))
         };
         let stamps: Vec<Stamps> = cameras.iter().map(compared).collect::<Result<_, _>>()?;
-        let is_gimballed: Vec<bool> = cameras.iter().map(|camera| camera.mount == CameraMount::Gimbal).collect();
-        Ok(Self::by_stamps(&stamps, &is_gimballed, has_gimbal_imu))
+        let mounts: Vec<Mount> = cameras.iter().map(|camera| Mount::of(camera)).collect();
+        Ok(Self::by_stamps(&stamps, &mounts, has_gimbal_imu))
     }
 
-    fn by_stamps(stamps: &[Stamps], is_gimballed: &[bool], has_gimbal_imu: bool) -> Option<Self> {
+    fn by_stamps(stamps: &[Stamps], mounts: &[Mount], has_gimbal_imu: bool) -> Option<Self> {
         let interval = |camera: usize| stamps[camera].interval_ns().map(|interval_ns| (interval_ns, camera));
-        let fastest = |gimballed: bool| {
-            (0..stamps.len()).filter(|camera| is_gimballed[*camera] == gimballed).filter_map(interval).min()
-        };
-        let camera = match (fastest(false), fastest(true)) {
+        let fastest =
+            |mount: Mount| (0..stamps.len()).filter(|camera| mounts[*camera] == mount).filter_map(interval).min();
+        let camera = match (fastest(Mount::Imu), fastest(Mount::Gimbal)) {
             (Some((rigid_ns, _)), Some((gimballed_ns, camera)))
                 if has_gimbal_imu || gimballed_ns as f64 * FASTER < rigid_ns as f64 =>
             {
@@ -77,6 +76,27 @@ impl FrameCamera {
         let apart = stamps.iter().any(is_apart);
         let reach_ns = (stamps[camera].interval_ns()? as f64 * REACH) as i64;
         apart.then_some(Self { camera, reach_ns: reach_ns.min(MAX_REACH_NS) })
+    }
+}
+
+/// Mount of a camera.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Mount {
+    /// Rigid, with a pose relative to the IMU.
+    Imu,
+    /// On the gimbal, with a pose by its chain.
+    Gimbal,
+    /// On another camera; no frames lie at its images.
+    Camera,
+}
+
+impl Mount {
+    fn of(camera: &CameraRig) -> Self {
+        match (&camera.relative_prior, &camera.mount) {
+            (Some(_), _) => Self::Camera,
+            (None, CameraMount::Gimbal) => Self::Gimbal,
+            (None, CameraMount::Static { .. }) => Self::Imu,
+        }
     }
 }
 
@@ -114,7 +134,7 @@ mod tests {
     }
 
     fn chosen(gimballed: Stamps, rigid: Stamps, has_gimbal_imu: bool) -> Option<(usize, f64)> {
-        let found = FrameCamera::by_stamps(&[gimballed, rigid], &[true, false], has_gimbal_imu)?;
+        let found = FrameCamera::by_stamps(&[gimballed, rigid], &[Mount::Gimbal, Mount::Imu], has_gimbal_imu)?;
         Some((found.camera, found.reach_ns as f64 * 1e-6))
     }
 

@@ -7,11 +7,9 @@ use std::sync::mpsc::Receiver;
 
 use super::frame_camera::{FrameCamera, TOGETHER_NS};
 use super::step_inputs::OwnedStepInput;
+use crate::estimator::OTHER_CAMERA_FRAMES;
 use crate::geometry::seconds_from_ns;
 use crate::sensors::ImuSample;
-
-/// Offset of the indices of sets without an image of the main camera; larger than any index of the main camera.
-const MISSING_IMAGE_OFFSET: usize = 1 << 30;
 
 /// Images of one camera of a run.
 #[derive(Debug)]
@@ -151,7 +149,7 @@ impl FrameSets {
         };
         let is_interleaved = self.frame_camera.is_some();
         OwnedStepInput {
-            frame_index: main.map_or(MISSING_IMAGE_OFFSET * set.frame + frame.frame_index, |main| main.frame_index),
+            frame_index: main.map_or(OTHER_CAMERA_FRAMES * set.frame + frame.frame_index, |main| main.frame_index),
             stamp_ns: self.main_shift_ns.map_or(frame.stamp_ns, |shift_ns| frame.imu_stamp_ns() - shift_ns),
             log_time_ns: frame.log_time_ns,
             imu,
@@ -285,7 +283,7 @@ mod tests {
             assert_eq!(input.frontend_ms, (0..2).filter(|camera| has(*camera)).count() as f64);
             seen.push([has(0), has(1)]);
             // The index of the main camera's image where there is one, else an index that no image of it has.
-            assert_eq!(input.frame_index < MISSING_IMAGE_OFFSET, has(0));
+            assert_eq!(input.frame_index < OTHER_CAMERA_FRAMES, has(0));
         }
         assert_eq!(seen.len(), 12);
         assert_eq!((seen[4], seen[7], seen[9]), ([false, true], [true, false], [true, false]));

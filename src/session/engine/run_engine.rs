@@ -11,8 +11,8 @@ use crate::gimbal::{Chain, ParameterGroup, ParameterId};
 use crate::observability::{RankReport, analyse};
 use crate::session::record::StepRecord;
 
-/// Jacobian columns of the extrinsics of a second, rigid camera.
-const RIGID_COLUMNS: usize = 6;
+/// Jacobian columns of the extrinsics of a further camera.
+const POSE_COLUMNS: usize = 6;
 
 /// An estimator with the observability analysis of its steps.
 #[derive(Clone, Debug)]
@@ -81,12 +81,12 @@ impl RunEngine {
     }
 
     pub(in crate::session) fn cameras(&self) -> usize {
-        1 + self.estimator.config().rigid_cameras.len()
+        1 + self.estimator.config().further_cameras.len()
     }
 
     /// Keys of the estimator's cameras; `main` is the key of the main camera.
     pub(in crate::session) fn camera_keys(&self, main: &str) -> Vec<String> {
-        let rigid = self.estimator.config().rigid_cameras.iter().map(|camera| camera.key.clone());
+        let rigid = self.estimator.config().further_cameras.iter().map(|camera| camera.key.clone());
         std::iter::once(main.to_owned()).chain(rigid).collect()
     }
 
@@ -142,7 +142,7 @@ impl RunEngine {
                 None => Cow::Borrowed(&**tracks),
             })
             .collect();
-        let rigid: Vec<&TrackedFrame> = altered.iter().skip(1).map(Cow::as_ref).collect();
+        let further: Vec<&TrackedFrame> = altered.iter().skip(1).map(Cow::as_ref).collect();
         let read = self.settings.has_joints && !unread && !self.settings.altered_measurements.encoder_off();
         let angles = input.joint_angles.as_ref().filter(|_| read);
         let noisy = angles.and_then(|angles| self.settings.altered_measurements.joint_angles(angles, input.stamp_ns));
@@ -167,7 +167,7 @@ impl RunEngine {
             gimbal_imu,
             joint_angles: noisy.as_ref().or(angles),
             tracks: &altered[0],
-            rigid_tracks: &rigid,
+            further_tracks: &further,
         })
     }
 
@@ -177,10 +177,10 @@ impl RunEngine {
         let angles: Vec<&[f64]> = report.window.iter().map(|frame| frame.joint_angles_rad.as_slice()).collect();
         let calibration = &report.calibration;
         let chain = Chain::from_classical(&calibration.classical, calibration.parameterization);
-        let rigid = RIGID_COLUMNS * calibration.rigid_cameras.len();
+        let further = POSE_COLUMNS * calibration.further_cameras.len();
         let is_of_chain = |parameter: &&ParameterId| parameter.group() == ParameterGroup::Chain;
         let chain_columns = calibration.parameters.iter().filter(is_of_chain).count();
-        let chain = if chain.dof() + rigid == chain_columns { chain } else { chain.without_joint_offsets() };
+        let chain = if chain.dof() + further == chain_columns { chain } else { chain.without_joint_offsets() };
         // In a fork without encoders, frames of the window may still have encoder readings that the parent used.
         let unread = || report.window.iter().all(|frame| frame.encoder_angles_rad.is_none());
         let joints_free = self.settings.joints_free

@@ -115,6 +115,10 @@ impl StepMeasurements for OwnedStepInput {
     fn features(&self, camera: usize) -> &[TrackedFeature] {
         self.tracks.get(camera).map_or(&[], |tracks| &tracks.features)
     }
+
+    fn matched(&self, camera: usize) -> &[TrackedFeature] {
+        self.tracks.get(camera).map_or(&[], |tracks| &tracks.matched)
+    }
 }
 
 /// Inputs of a run's steps so far, shared with its forks.

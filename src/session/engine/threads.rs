@@ -63,6 +63,7 @@ impl Engine {
     ) -> Result<(), SessionError> {
         let Some(sender) = self.sender.clone() else { return Ok(()) };
         let mut queues: BTreeMap<&str, Vec<SyncSender<Arc<OwnedStepInput>>>> = BTreeMap::new();
+        let mut partners: BTreeMap<&str, &str> = BTreeMap::new();
         for &run in runs {
             let (spec, _) = &plan.runs[run];
             let cameras: Vec<_> = cameras_of_run(&plan.rig, spec)?.iter().collect();
@@ -71,6 +72,10 @@ impl Engine {
                 let (queue, receiver) = sync_channel(FRAME_QUEUE_CAPACITY);
                 queues.entry(&camera.key).or_default().push(queue);
                 frames.push(receiver);
+                let partner = plan.rig.stereo_partner(camera).map(|partner| partner.key.as_str());
+                if let Some(partner) = partner.filter(|partner| cameras.iter().any(|other| other.key == *partner)) {
+                    partners.insert(&camera.key, partner);
+                }
             }
             let mut config = config_with_prior(plan, spec)?;
             let has_gimbal_imu = config.gimbal_imu.is_some();
@@ -85,9 +90,12 @@ impl Engine {
             })?);
         }
         for (camera_key, queues) in queues {
-            let tracker =
-                CameraTracker::new(Arc::clone(&plan.log), &plan.rig, camera_key, plan.start_s, plan.duration_s)?
-                    .with_ground_truth(plan.replaced_ground_truth());
+            let (log, rig, start_s, duration_s) = (&plan.log, &plan.rig, plan.start_s, plan.duration_s);
+            let mut tracker = CameraTracker::new(Arc::clone(log), rig, camera_key, start_s, duration_s)?
+                .with_ground_truth(plan.replaced_ground_truth());
+            if let Some(partner) = partners.get(camera_key) {
+                tracker = tracker.with_partner(log, rig, [camera_key, partner], start_s, duration_s)?;
+            }
             let results = sender.clone();
             let cancelled = Arc::clone(&self.cancelled);
             self.threads.push(spawn(format!("tracker {camera_key}"), move || {

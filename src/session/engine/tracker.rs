@@ -4,14 +4,16 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
+use super::frame_camera::TOGETHER_NS;
 use super::step_inputs::OwnedStepInput;
 use super::stopwatch::Stopwatch;
 use crate::flight_log::{FlightLog, FrameStream, LogError, LogWarning, SensorFrame, WarningKind};
 use crate::frontend::{
-    ChainOrientation, FrontEnd, FrontEndOptions, PredictionNoise, camera_rates, predict_camera_rotation,
+    ChainOrientation, FrontEnd, FrontEndOptions, PredictionNoise, StereoCamera, StereoMatcher, TrackedFrame,
+    camera_rates, predict_camera_rotation,
 };
 use crate::gimbal::ClassicalChain;
-use crate::sensors::{CameraMount, ImuSample, PoseTrack, Rig};
+use crate::sensors::{CameraMount, CameraRig, ChainPrior, ImuSample, PoseTrack, Rig};
 use crate::session::plan::SessionError;
 
 pub(super) struct CameraTracker {
@@ -22,10 +24,38 @@ pub(super) struct CameraTracker {
     readout_s: f64,
     previous_orientation: Option<ChainOrientation>,
     gimbal_imu: Option<GimbalGyroscope>,
+    /// Other camera of a stereo pair, `None` if no run uses one.
+    stereo: Option<StereoTracker>,
     /// True after the first image.
     tracking: bool,
     /// Ground truth in place of the log's; `None` keeps the log's.
     ground_truth: Option<Arc<PoseTrack>>,
+}
+
+/// Images of the other camera of a stereo pair.
+struct StereoTracker {
+    stream: FrameStream,
+    matcher: StereoMatcher,
+    /// Image that has been read and is not older than the features.
+    next: Option<SensorFrame>,
+}
+
+impl StereoTracker {
+    /// Adds the observations of the features in the image of the same moment, if there is one; `last` is the IMU sample at
+    /// the stamp of the features.
+    fn match_features(&mut self, front_end: &FrontEnd, tracks: &mut TrackedFrame, last: Option<&ImuSample>) {
+        let Some(at_ns) = last.map(|last| last.stamp_ns) else { return };
+        let stamp_ns = |frame: &SensorFrame| frame.imu.last().map_or(i64::MIN, |last| last.stamp_ns);
+        while self.next.as_ref().is_none_or(|next| stamp_ns(next) < at_ns - TOGETHER_NS) {
+            self.next = self.stream.next_frame();
+            if self.next.is_none() {
+                return;
+            }
+        }
+        if let Some(frame) = self.next.take_if(|next| stamp_ns(next) <= at_ns + TOGETHER_NS) {
+            tracks.matched = self.matcher.match_features(front_end.last_image(), &frame.image, &tracks.features);
+        }
+    }
 }
 
 /// Gyroscope that moves with the camera.
@@ -36,10 +66,11 @@ struct GimbalGyroscope {
 }
 
 impl GimbalGyroscope {
-    /// Gyroscope of the rig for a camera with this mount; `None` without one, or for a rigid camera.
-    fn of_rig(rig: &Rig, mount: &CameraMount) -> Option<Self> {
-        let imu = rig.gimbal_imu.as_ref().filter(|_| *mount == CameraMount::Gimbal)?;
-        let camera = ClassicalChain { imu_from_base: imu.camera_from_imu.inverse(), ..ClassicalChain::default() };
+    /// Gyroscope of the rig for a camera; `None` without one, or for a rigid camera.
+    fn of_rig(rig: &Rig, camera: &CameraRig) -> Option<Self> {
+        let imu = rig.gimbal_imu.as_ref().filter(|_| camera.is_on_gimbal())?;
+        let imu_from_camera = imu.camera_from_imu.inverse() * camera.first_from_camera;
+        let camera = ClassicalChain { imu_from_base: imu_from_camera, ..ClassicalChain::default() };
         Some(Self {
             orientation: ChainOrientation::new(&camera, &[], &[]),
             noise: PredictionNoise {
@@ -85,10 +116,36 @@ impl CameraTracker {
             noise: prediction_noise(rig, &camera.mount),
             readout_s: camera.readout_s,
             previous_orientation: None,
-            gimbal_imu: GimbalGyroscope::of_rig(rig, &camera.mount),
+            gimbal_imu: GimbalGyroscope::of_rig(rig, camera),
+            stereo: None,
             tracking: false,
             ground_truth: None,
         })
+    }
+
+    /// Matches the features in the images of the other camera of a stereo pair.
+    pub(super) fn with_partner(
+        self,
+        log: &Arc<FlightLog>,
+        rig: &Rig,
+        [camera_key, partner_key]: [&str; 2],
+        start_s: f64,
+        duration_s: Option<f64>,
+    ) -> Result<Self, SessionError> {
+        let partner = rig.camera(partner_key).map_err(LogError::from)?;
+        let Some(camera_from_partner) = rig.base_from_camera(Some(camera_key), partner_key) else { return Ok(self) };
+        let camera = StereoCamera {
+            model: partner.model.clone(),
+            mask: partner.mask.as_ref().map(|mask| mask.image.clone()),
+            here_from_features: camera_from_partner.inverse(),
+            orientation_sigma_rad: partner.relative_prior.unwrap_or(ChainPrior::RELATIVE).sigmas().1,
+        };
+        let stereo = StereoTracker {
+            stream: FrameStream::new(Arc::clone(log), rig, partner_key, start_s, duration_s)?,
+            matcher: StereoMatcher::new(self.front_end.camera().clone(), camera),
+            next: None,
+        };
+        Ok(Self { stereo: Some(stereo), ..self })
     }
 
     /// Replaces the ground truth of the log; `None` keeps it.
@@ -127,7 +184,10 @@ impl CameraTracker {
             self.tracking = true;
             self.previous_orientation = orientation;
             match self.front_end.process(&frame.image, frame.stamp_ns, predicted.as_ref()) {
-                Ok(tracks) => {
+                Ok(mut tracks) => {
+                    if let Some(stereo) = &mut self.stereo {
+                        stereo.match_features(&self.front_end, &mut tracks, frame.imu.last());
+                    }
                     frame.warnings.append(&mut rejected);
                     let warnings = std::mem::take(&mut frame.warnings);
                     return Some((OwnedStepInput::of_camera(frame, tracks, watch.elapsed_ms()), warnings));

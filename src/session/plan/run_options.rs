@@ -1,6 +1,8 @@
 //! The options of a run: one row per key of a specification. Parser, canonical text, messages, `--help`, the dialog "Add a
 //! run" and docs/commands.md come from this table.
 
+use std::collections::BTreeSet;
+
 use super::run_spec::{RunSpec, folder_name};
 use crate::estimator::SensorParameters;
 use crate::optimization::RobustLoss;
@@ -110,6 +112,15 @@ impl RunSpec {
                 |spec| spec.camera_key.iter().cloned().collect(),
             ),
         ),
+        Key::<Self>::new(
+            "cameras",
+            "KEY+KEY",
+            "the cameras of a `cluster`, as in `cameras=cam0+cam2`; by default all of the rig",
+            Field::Other(read_cameras, |spec| {
+                let keys = spec.cluster_keys.join("+");
+                (!keys.is_empty()).then_some(keys).into_iter().collect()
+            }),
+        ),
         // The canonical text of the settings has no name.
         Key::<Self>::new("name", "LABEL", "name on screen and of the folder", Field::Other(read_name, |_| Vec::new())),
     ];
@@ -158,6 +169,16 @@ fn loss_text(loss: &RobustLoss) -> String {
 fn read_iterations(spec: &mut RunSpec, entry: &Entry<'_>) -> Result<(), String> {
     let expected = || entry.problem(&format!("a number from {} to {}", ITERATIONS.start(), ITERATIONS.end()));
     spec.tuning.iterations = Some(entry.number(&ITERATIONS).ok_or_else(expected)?);
+    Ok(())
+}
+
+fn read_cameras(spec: &mut RunSpec, entry: &Entry<'_>) -> Result<(), String> {
+    let keys: Vec<String> = entry.value.split('+').map(str::to_owned).collect();
+    let distinct: BTreeSet<&String> = keys.iter().collect();
+    if keys.len() < 2 || distinct.len() < keys.len() || keys.iter().any(String::is_empty) {
+        return Err(entry.problem("two or more different keys of cameras, as in cam0+cam2"));
+    }
+    spec.cluster_keys = keys;
     Ok(())
 }
 

@@ -26,7 +26,7 @@ pub enum ParameterizationChoice {
     Poe,
     /// The extrinsics of the rig's rigid camera.
     Static,
-    /// The gimbal camera as in `auto` and the rig's rigid camera, in one window.
+    /// The gimbal camera as in `auto`, if there is one, and the rig's rigid cameras, in one window.
     Cluster,
 }
 
@@ -73,8 +73,8 @@ impl ParameterizationChoice {
             ),
             Self::Static => ("static camera of the rig, rigid extrinsics", "the first rigid camera of the rig"),
             Self::Cluster => (
-                "gimbal camera and static camera in one window",
-                "the gimbal camera as in `auto` and the first rigid camera, in one window",
+                "all cameras in one window",
+                "the gimbal camera as in `auto` and the rigid cameras in one window, or several rigid cameras",
             ),
         }
     }
@@ -112,8 +112,10 @@ pub struct RunSpec {
     pub window: usize,
     pub passes: usize,
     /// Key of the main camera. `None` means the gimballed camera, or the first rigid one for `static` and for rigs without
-    /// a gimbal. A `cluster` also uses the first rigid camera.
+    /// a gimbal, and for a `cluster` the first of [`Self::cluster_keys`] on the gimbal, else their first.
     pub camera_key: Option<String>,
+    /// Keys of the cameras of a `cluster`; empty means all of the rig.
+    pub cluster_keys: Vec<String>,
     pub tuning: EstimatorTuning,
 }
 
@@ -135,6 +137,7 @@ impl Default for RunSpec {
             window: 10,
             passes: 1,
             camera_key: None,
+            cluster_keys: Vec::new(),
             tuning: EstimatorTuning::default(),
         }
     }
@@ -200,6 +203,9 @@ impl FromStr for RunSpec {
         let estimated = |columns: &SensorParameters| run.estimates(*columns) && run.excludes(columns.key());
         if let Some(columns) = SensorParameters::ALL.into_iter().find(estimated) {
             return Err(bad(format!("{}=on requires calibrate=on", columns.key())));
+        }
+        if parameterization != ParameterizationChoice::Cluster && !run.cluster_keys.is_empty() {
+            return Err(bad("cameras=… requires a cluster; camera=KEY is the camera of any other run".to_owned()));
         }
         Ok(run)
     }

@@ -11,10 +11,10 @@ use super::flight_prior::FlightPrior;
 use super::run_spec::{MAX_RUNS, ParameterizationChoice, RunSpec};
 use super::trajectories::{self, LoadedPositions, LoadedTrajectory, LoadedTruth};
 use super::trajectory_spec::{TrajectorySource, TrajectorySpec};
-use crate::estimator::rigid_columns;
+use crate::estimator::pose_columns;
 use crate::files::LogLimits;
 use crate::flight_log::{FlightLog, is_batch_reference};
-use crate::geometry::seconds_from_ns;
+use crate::geometry::{RigidTransform, seconds_from_ns};
 use crate::gimbal::{Chain, ParameterId, Parameterization};
 use crate::sensors::{CameraMount, CameraRig, LeverArm, PoseTrack, Rig};
 use crate::text::Named as _;
@@ -168,9 +168,10 @@ impl SessionPlan {
         let mut parameters: Vec<ParameterId> = Vec::new();
         for (spec, camera_key) in &self.runs {
             parameters.extend(chain_parameters(&self.rig, camera_key));
-            let rigid = cameras_of_run(&self.rig, spec).ok().and_then(|cameras| cameras.rigid);
-            let pose = |key: &str| self.rig.chain_of_camera(key).unwrap_or_default().imu_from_camera(&[]);
-            parameters.extend(rigid.into_iter().flat_map(|it| rigid_columns(1, &pose(&it.key))).map(|(id, _)| id));
+            let columns =
+                |camera: &CameraRig| pose_columns(self.rig.camera_number(&camera.key), &RigidTransform::identity());
+            let others = cameras_of_run(&self.rig, spec).map(|cameras| cameras.others).unwrap_or_default();
+            parameters.extend(others.into_iter().flat_map(columns).map(|(id, _)| id));
         }
         let mut known = BTreeSet::new();
         parameters.retain(|parameter| known.insert(*parameter));
@@ -197,14 +198,14 @@ pub(in crate::session) fn check_start(log: &FlightLog, start_s: f64) -> Result<(
 pub(in crate::session) struct RunCameras<'rig> {
     /// The camera whose image is shown.
     pub(in crate::session) main: &'rig CameraRig,
-    /// The second, rigid camera.
-    pub(in crate::session) rigid: Option<&'rig CameraRig>,
+    /// The other cameras of a cluster, in the order of the rig.
+    pub(in crate::session) others: Vec<&'rig CameraRig>,
 }
 
 impl<'rig> RunCameras<'rig> {
-    /// The main camera, then the rigid one.
+    /// The main camera, then the others.
     pub(in crate::session) fn iter(&self) -> impl Iterator<Item = &'rig CameraRig> {
-        std::iter::once(self.main).chain(self.rigid)
+        std::iter::once(self.main).chain(self.others.iter().copied())
     }
 }
 
@@ -212,36 +213,57 @@ pub(in crate::session) fn cameras_of_run<'rig>(
     rig: &'rig Rig,
     spec: &RunSpec,
 ) -> Result<RunCameras<'rig>, SessionError> {
-    let is_gimballed = |camera: &&CameraRig| camera.mount == CameraMount::Gimbal;
-    let gimballed = || "a camera with mount: gimbal".to_owned();
-    let rigid = || (rig.cameras.iter().find(|camera| !is_gimballed(camera)), "a camera with mount: static".to_owned());
-    let cluster = spec.parameterization == ParameterizationChoice::Cluster;
-    let (camera, wanted) = match &spec.camera_key {
-        Some(key) if cluster => {
-            let camera = rig.cameras.iter().find(|camera| camera.key == *key).filter(is_gimballed);
-            (camera, format!("camera '{key}' with mount: gimbal"))
+    let refused = |wanted: String| SessionError::NoCamera {
+        run: spec.label.clone(),
+        wanted,
+        rig: rig.name.clone(),
+        present: rig.cameras.iter().map(describe).collect::<Vec<_>>().join(", "),
+    };
+    if spec.parameterization == ParameterizationChoice::Cluster {
+        return cluster(rig, spec, refused);
+    }
+    let (main, wanted) = match &spec.camera_key {
+        Some(key) => (with_key(rig, key), format!("camera '{key}'")),
+        None if spec.parameterization == ParameterizationChoice::Static || rig.gimbal.is_none() => {
+            (rig.cameras.iter().find(|camera| !is_gimballed(camera)), "a camera with mount: static".to_owned())
         }
-        Some(key) => (rig.cameras.iter().find(|camera| camera.key == *key), format!("camera '{key}'")),
-        None if cluster => (rig.cameras.iter().find(is_gimballed), gimballed()),
-        None if spec.parameterization == ParameterizationChoice::Static || rig.gimbal.is_none() => rigid(),
-        None => (rig.cameras.iter().find(is_gimballed), gimballed()),
+        None => (rig.cameras.iter().find(is_gimballed), "a camera with mount: gimbal".to_owned()),
     };
-    let found = |camera: Option<&'rig CameraRig>, wanted: String| {
-        camera.ok_or_else(|| SessionError::NoCamera {
-            run: spec.label.clone(),
-            wanted,
-            rig: rig.name.clone(),
-            present: rig.cameras.iter().map(describe).collect::<Vec<_>>().join(", "),
-        })
-    };
-    let main = found(camera, wanted)?;
-    let rigid = if cluster {
-        let (camera, wanted) = rigid();
-        Some(found(camera, wanted)?)
+    Ok(RunCameras { main: main.ok_or_else(|| refused(wanted))?, others: Vec::new() })
+}
+
+/// Cameras of a cluster: those that it names, else all; the one on the gimbal is the main one.
+fn cluster<'rig>(
+    rig: &'rig Rig,
+    spec: &RunSpec,
+    refused: impl Fn(String) -> SessionError,
+) -> Result<RunCameras<'rig>, SessionError> {
+    let named = &spec.cluster_keys;
+    if let Some(unknown) = named.iter().find(|key| with_key(rig, key).is_none()) {
+        return Err(refused(format!("camera '{unknown}'")));
+    }
+    let is_used = |camera: &&CameraRig| named.is_empty() || named.contains(&camera.key);
+    let mut cameras: Vec<&CameraRig> = rig.cameras.iter().filter(is_used).collect();
+    let main = if let Some(key) = &spec.camera_key {
+        let camera = cameras.iter().find(|camera| camera.key == *key && is_gimballed(camera));
+        *camera.ok_or_else(|| refused(format!("camera '{key}' with mount: gimbal")))?
     } else {
-        None
+        let first = cameras.iter().find(|camera| is_gimballed(camera)).or_else(|| cameras.first());
+        *first.ok_or_else(|| refused("a camera".to_owned()))?
     };
-    Ok(RunCameras { main, rigid })
+    cameras.retain(|camera| camera.key != main.key);
+    if cameras.is_empty() {
+        return Err(refused("a second camera".to_owned()));
+    }
+    Ok(RunCameras { main, others: cameras })
+}
+
+fn with_key<'rig>(rig: &'rig Rig, key: &str) -> Option<&'rig CameraRig> {
+    rig.cameras.iter().find(|camera| camera.key == key)
+}
+
+fn is_gimballed(camera: &&CameraRig) -> bool {
+    camera.mount == CameraMount::Gimbal
 }
 
 fn describe(camera: &CameraRig) -> String {

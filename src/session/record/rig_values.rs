@@ -3,9 +3,9 @@
 use nalgebra::Vector3;
 
 use super::run::RunRecord;
-use crate::estimator::{CalibrationEstimate, imu_columns, imu_intrinsics, rigid_columns};
-use crate::geometry::so3;
-use crate::gimbal::{Chain, NearestForm, ParameterId, ParameterPart, Parameterization, Quantity};
+use crate::estimator::{CalibrationEstimate, imu_columns, imu_intrinsics, pose_columns};
+use crate::geometry::{RigidTransform, so3};
+use crate::gimbal::{Chain, ClassicalChain, NearestForm, ParameterId, ParameterPart, Parameterization, Quantity};
 use crate::sensors::{CameraMount, Rig};
 
 impl RunRecord {
@@ -18,13 +18,17 @@ impl RunRecord {
         let main = rig.chain_of_camera(&self.camera_key)?;
         let conversion = self.conversion_for(given, estimate, estimate.parameterization)?;
         let mut values = conversion.values_of(&Chain::from_classical(&main, Parameterization::Classical));
-        for (camera, (key, _)) in (1..).zip(&estimate.rigid_cameras) {
-            values.extend(rigid_columns(camera, &rig.chain_of_camera(key)?.imu_from_camera(&[])));
+        for camera in &estimate.further_cameras {
+            let base_from_camera = match camera.base.as_deref() {
+                None => rig.chain_of_camera(&camera.key)?.imu_from_camera(&[]),
+                base => rig.base_from_camera(base, &camera.key)?,
+            };
+            values.extend(pose_columns(camera.number, &base_from_camera));
         }
-        let keys = self.camera_keys(estimate);
         for parameter in &estimate.parameters {
-            let ParameterPart::Camera(camera) = parameter.part else { continue };
-            let camera = rig.camera(keys.get(usize::from(camera))?).ok()?;
+            let ParameterPart::Camera(number) = parameter.part else { continue };
+            let rigid = estimate.further_cameras.iter().find(|camera| camera.number == number);
+            let camera = rig.camera(rigid.map_or(&self.camera_key, |rigid| &rigid.key)).ok()?;
             values.extend(camera.value(parameter.quantity).map(|value| (*parameter, value)));
         }
         if has_imu_columns(estimate) {
@@ -42,18 +46,15 @@ impl RunRecord {
         let mut rig = given.clone();
         let Some(last) = self.steps.last() else { return rig };
         let calibration = &last.report.calibration;
-        for (key, pose) in &calibration.rigid_cameras {
-            let camera = rig.cameras.iter_mut().find(|camera| camera.key == *key);
-            if let Some(CameraMount::Static { imu_from_camera }) = camera.map(|camera| &mut camera.mount) {
-                *imu_from_camera = *pose;
-            }
+        self.set_main_chain(&mut rig, &calibration.classical);
+        for camera in &calibration.further_cameras {
+            rig.set_base_from_camera(camera.base.as_deref(), &camera.key, camera.base_from_camera);
         }
         let values = calibration.values.iter().copied();
         let columns: Vec<(ParameterId, f64)> = calibration.parameters.iter().copied().zip(values).collect();
-        for (number, key) in self.camera_keys(calibration).into_iter().enumerate() {
-            let of_camera = columns.iter().filter(|(parameter, _)| {
-                matches!(parameter.part, ParameterPart::Camera(camera) if usize::from(camera) == number)
-            });
+        let rigid = calibration.further_cameras.iter().map(|camera| (camera.number, camera.key.as_str()));
+        for (number, key) in std::iter::once((0, self.camera_key.as_str())).chain(rigid) {
+            let of_camera = columns.iter().filter(|(parameter, _)| parameter.part == ParameterPart::Camera(number));
             let values: Vec<_> = of_camera.map(|(parameter, value)| (parameter.quantity, *value)).collect();
             if let Some(camera) = rig.cameras.iter_mut().find(|camera| camera.key == key) {
                 camera.set_values(&values);
@@ -64,22 +65,39 @@ impl RunRecord {
             rig.imu.intrinsics = intrinsics.in_frame_of(&given.imu.intrinsics).unwrap_or(intrinsics);
         }
         set_gimbal_imu(&mut rig, &columns);
-        let chain = &calibration.classical;
-        let Some(camera) = rig.cameras.iter_mut().find(|camera| camera.key == self.camera_key) else { return rig };
+        rig
+    }
+
+    /// Sets the chain of the main camera; the poses of other cameras relative to it do not change.
+    fn set_main_chain(&self, rig: &mut Rig, chain: &ClassicalChain) {
+        let paired: Vec<(String, RigidTransform)> = rig
+            .cameras
+            .iter()
+            .filter(|camera| rig.base_of(camera).is_some_and(|base| base.key == self.camera_key))
+            .filter_map(|camera| Some((camera.key.clone(), rig.base_from_camera(Some(&self.camera_key), &camera.key)?)))
+            .collect();
+        let Some(camera) = rig.cameras.iter_mut().find(|camera| camera.key == self.camera_key) else { return };
         match &mut camera.mount {
             CameraMount::Gimbal => {
+                let mut chain = chain.clone();
+                // The chain of the rig ends at its first camera.
+                if camera.relative_prior.is_some() {
+                    chain.effector_from_camera = chain.effector_from_camera * camera.first_from_camera.inverse();
+                }
                 if let Some(gimbal) = &mut rig.gimbal {
-                    gimbal.set_chain(chain.clone());
+                    gimbal.set_chain(chain);
                 }
             }
             CameraMount::Static { imu_from_camera } => *imu_from_camera = chain.imu_from_camera(&[]),
         }
-        rig
+        for (key, base_from_camera) in paired {
+            rig.set_base_from_camera(Some(&self.camera_key), &key, base_from_camera);
+        }
     }
 
-    /// Keys of the cameras, indexed by the camera number of their parameters, the main camera first.
+    /// Keys of the cameras in the order of their features, the main camera first.
     pub fn camera_keys<'a>(&'a self, estimate: &'a CalibrationEstimate) -> Vec<&'a str> {
-        let rigid = estimate.rigid_cameras.iter().map(|(key, _)| key.as_str());
+        let rigid = estimate.further_cameras.iter().map(|camera| camera.key.as_str());
         std::iter::once(self.camera_key.as_str()).chain(rigid).collect()
     }
 

@@ -56,7 +56,7 @@ pub struct StepFactorRows {
 /// Heap memory of one camera's tracks behind an [`Arc`], in bytes.
 pub(in crate::session) fn tracks_bytes(tracks: &TrackedFrame) -> usize {
     allocated_bytes(size_of::<TrackedFrame>() + 2 * size_of::<usize>())
-        + allocated_bytes(tracks.features.capacity() * size_of::<TrackedFeature>())
+        + allocated_bytes((tracks.features.capacity() + tracks.matched.capacity()) * size_of::<TrackedFeature>())
 }
 
 /// A warning and the steps that reported it.

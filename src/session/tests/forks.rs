@@ -273,7 +273,8 @@ fn one_camera_of_two_can_be_disabled() {
     let steps = &recording.runs[0].steps;
     let at = steps.iter().rposition(|step| step.report.phase == Phase::Tracking).unwrap() - 8;
     session.apply(Command::Seek { stamp_ns: steps[at].report.stamp_ns });
-    let [main, rigid] = [recording.runs[0].camera_key.clone(), steps[at].report.calibration.rigid_cameras[0].0.clone()];
+    let [main, rigid] =
+        [recording.runs[0].camera_key.clone(), steps[at].report.calibration.further_cameras[0].key.clone()];
     for (key, left) in [(&rigid, 0), (&main, 1)] {
         let changes: ForkChanges = format!("without={key}").parse().unwrap();
         session.apply(Command::Fork { run: 0, changes, label: None });

@@ -123,9 +123,9 @@ fn a_cluster_uses_the_gimballed_and_the_rigid_camera() {
     let (mut rig, rigid) = (rig_of(SyntheticMount::Gimbal), rig_of(SyntheticMount::Static));
     let refused = |rig: &Rig, text: &str| cameras_of_run(rig, &parse(text).unwrap()).unwrap_err().to_string();
     let message = refused(&rig, "cluster");
-    assert!(message.contains("mount: static") && message.contains("cam0 (mount: gimbal)"), "{message}");
+    assert!(message.contains("a second camera") && message.contains("cam0 (mount: gimbal)"), "{message}");
     let message = refused(&rigid, "cluster");
-    assert!(message.contains("mount: gimbal") && message.contains("cam0 (mount: static)"), "{message}");
+    assert!(message.contains("a second camera") && message.contains("cam0 (mount: static)"), "{message}");
 
     rig.cameras.push(CameraRig { key: "cam1".to_owned(), ..rigid.cameras[0].clone() });
     let keys = |text: &str| -> Vec<String> {
@@ -136,12 +136,36 @@ fn a_cluster_uses_the_gimballed_and_the_rigid_camera() {
     let message = refused(&rig, "cluster:camera=cam1");
     assert!(message.contains("camera 'cam1' with mount: gimbal"), "{message}");
 
+    // All cameras, or those that are named; parameters of a camera keep their number.
+    rig.cameras.push(CameraRig { key: "cam2".to_owned(), ..rigid.cameras[0].clone() });
+    let keys = |text: &str| -> Vec<String> {
+        cameras_of_run(&rig, &parse(text).unwrap()).unwrap().iter().map(|camera| camera.key.clone()).collect()
+    };
+    assert_eq!(keys("cluster"), ["cam0", "cam1", "cam2"]);
+    assert_eq!(keys("cluster:cameras=cam2+cam0"), ["cam0", "cam2"]);
+    assert_eq!(keys("cluster:cameras=cam2+cam1"), ["cam1", "cam2"]);
+    let config = estimator_config(&rig, &parse("cluster:cameras=cam0+cam2").unwrap()).unwrap();
+    let further: Vec<_> = config.further_cameras.iter().map(|camera| (camera.key.as_str(), camera.number)).collect();
+    assert_eq!(further, [("cam2", 2)]);
+    let message = refused(&rig, "cluster:cameras=cam0+cam7");
+    assert!(message.contains("camera 'cam7'"), "{message}");
+    for (text, problem) in [
+        ("auto:cameras=cam0+cam1", "cameras=… requires a cluster"),
+        ("cluster:cameras=cam0", "two or more different keys"),
+        ("cluster:cameras=cam0+cam0", "two or more different keys"),
+    ] {
+        let message = text.parse::<RunSpec>().unwrap_err().to_string();
+        assert!(message.contains(problem), "{message}");
+    }
+    assert_eq!(parse("cluster:cameras=cam0+cam2").unwrap().settings(), "cluster:cameras=cam0+cam2");
+    rig.cameras.pop();
+
     // Both cameras are configured as in the runs that use one of them.
     let config = |text: &str| estimator_config(&rig, &parse(text).unwrap()).unwrap();
     let (cluster, alone) = (config("cluster:window=8,calibrate=off,encoder=off"), config("static"));
     assert_eq!((cluster.options.window, cluster.calibrate, cluster.use_encoder), (8, false, false));
     assert_eq!(cluster.chain, config("auto").chain);
-    let [beside] = cluster.rigid_cameras.as_slice() else { panic!("one rigid camera") };
-    assert_eq!((beside.key.as_str(), beside.imu_from_camera), ("cam1", alone.chain.imu_from_base));
+    let [beside] = cluster.further_cameras.as_slice() else { panic!("one rigid camera") };
+    assert_eq!((beside.key.as_str(), beside.base_from_camera), ("cam1", alone.chain.imu_from_base));
     assert_eq!(Some(beside.prior), alone.chain_prior);
 }

@@ -26,6 +26,8 @@ pub(super) fn experiment_scenario(experiment: Experiment, seed: u64, duration_s:
     let equipment = Equipment {
         gimbal_camera,
         static_camera: true,
+        stereo_baseline_m: None,
+        second_gimbal_camera: false,
         lens: Lens::Pinhole,
         resolution_px: [640, 480],
         camera_rate_hz: 20.0,

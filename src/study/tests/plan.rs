@@ -21,6 +21,10 @@ encoder_sigma_deg = 0.5
 size_px = [320, 240]
 rate_hz = 10
 static_camera = false
+camera_rate_hz = 15
+camera_phase_ms = 11
+stereo_m = 0.12
+gimbal_camera = "thermal"
 disturb = ["exposure=0.01"]
 start_error_m = 0.03
 start_error_deg = 10
@@ -99,6 +103,10 @@ fn every_key_is_read() {
     let [town, t4] = plan.flights.as_slice() else { panic!("two flights") };
     assert_eq!((town.size_px, town.encoder, town.static_camera), ([320, 240], EncoderNoise::Degrees(0.5), false));
     assert!(town.mirrored && !t4.mirrored);
+    assert_eq!((town.static_camera_rate_hz, town.static_camera_phase_s), (Some(15.0), Some(0.011)));
+    let options = town.options(1, &[]).unwrap();
+    assert_eq!((options.stereo_baseline_m, options.second_gimbal_camera), (Some(0.12), true));
+    assert_eq!((t4.stereo_baseline_m, t4.gimbal_camera.as_deref()), (None, None));
     assert_eq!((town.gimbal_imu_noise_scale, t4.gimbal_imu_noise_scale), (Some(0.5), None));
     assert_eq!((t4.name.as_str(), t4.experiment.as_str(), t4.encoder), ("t4", "T4", EncoderNoise::None));
     assert_eq!(plan.disturbances[1].disturb, ["blank=11,1"]);
@@ -176,6 +184,7 @@ fn errors_name_line_key_and_what_is_allowed() {
     check(&flight("world = \"desert\""), "'flights[1].world' is 'desert', expected textured, plain or facades");
     check(&flight("world = \"plain\""), "'flights[1].world' T3 has no world 'plain': expected textured, or facades");
     check(&flight("swing_deg = 91"), "'flights[1].swing_deg' is 91");
+    check(&flight("gimbal_camera = \"zoom\""), "'flights[1].gimbal_camera' is 'zoom', expected thermal");
     check(&flight("static_camera = 1"), "'flights[1].static_camera' is 1, expected true or false");
     check(&changes("quantity = \"gimbal.d\", magnitude = 1"), "expected one of gimbal.translation");
     check(

@@ -40,12 +40,20 @@ fn attempt(
             frame_index: first + index,
             stamp_ns: frame.stamp_ns,
             features: &frame.features,
+            matched: &[],
             imu_from_camera: frame.imu_from_camera,
             imu: &frame.imu,
         })
         .collect();
     try_initialize(
-        &InitializationInput { frames: &frames, gravity_m_per_s2: GRAVITY, imu_noise: noise(), stationary, bias: None },
+        &InitializationInput {
+            frames: &frames,
+            gravity_m_per_s2: GRAVITY,
+            imu_noise: noise(),
+            stationary,
+            bias: None,
+            pair: None,
+        },
         options,
     )
 }
@@ -129,7 +137,7 @@ fn check(name: &str, seeds: u64, flight_of: impl Fn(u64) -> FlightOptions, limit
         let options = options_for(&flight_options);
         match run(&flight, &options) {
             Ok((newest, solution)) => {
-                assert_eq!(solution.origin, InitializationOrigin::FromMotion);
+                assert_eq!(solution.origin, InitializationOrigin::Motion);
                 let errors = errors(&flight, flight_options.hover_s, newest, &solution);
                 let d = &solution.diagnostics;
                 println!(
@@ -254,7 +262,7 @@ fn a_stationary_estimate_is_kept_or_used_at_once() {
     let InitializationOutcome::Initialized(solution) = attempt(&flight, newest, &at_once, None) else {
         panic!("the policy initializes a stationary vehicle at once");
     };
-    assert_eq!(solution.origin, InitializationOrigin::FromStationary);
+    assert_eq!(solution.origin, InitializationOrigin::Stationary);
     let errors = errors(&flight, 0.0, newest, &solution);
     // The accelerometer bias tilts the world by up to asin(0.5·√2/9.81) = 4.1°.
     assert!(errors.gravity_deg < 4.2 && errors.velocity_m_per_s < 1e-9, "{errors:?}");

@@ -17,6 +17,7 @@ use nalgebra::Vector3;
 
 use crate::camera::CameraModel;
 use crate::files::urdf::DescribedChain;
+use crate::geometry::RigidTransform;
 use crate::sensors::{
     AssumedField, AttitudeSource, BodyAxes, CameraMount, CameraRig, ChainPrior, GimbalImuRig, GimbalRig, ImuIntrinsics,
     ImuNoise, ImuRig, IntrinsicsSigma, RequiredAccuracy, Rig,
@@ -171,6 +172,8 @@ impl RigTemplate {
             gimbal_imu: self.gimbal_imu.as_ref().map(gimbal_imu_rig),
             cameras: vec![CameraRig {
                 key: "cam0".to_owned(),
+                first_from_camera: RigidTransform::identity(),
+                relative_prior: None,
                 mount,
                 topic: self.camera.topic.value.clone(),
                 use_log_time: false,

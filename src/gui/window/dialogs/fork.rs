@@ -191,7 +191,7 @@ fn sensors_of(ctx: &PanelContext<'_>) -> Vec<&'static str> {
 /// The second camera of the shown run.
 fn second_camera(ctx: &PanelContext<'_>) -> Option<String> {
     let (_, step) = ctx.selected_step()?;
-    step.report.calibration.rigid_cameras.first().map(|(key, _)| key.clone())
+    step.report.calibration.further_cameras.first().map(|camera| camera.key.clone())
 }
 
 #[cfg(test)]

@@ -89,7 +89,7 @@ fn image_lines(step: &StepRecord) -> Vec<String> {
     vec![
         format!(
             "Frame {} at {} s: {} features tracked, {} new, {} in the solve.",
-            report.frame_index,
+            report.frame_name(),
             fixed(seconds_from_ns(report.stamp_ns), 2),
             statistics.tracked,
             statistics.detected,

@@ -58,7 +58,7 @@ fn step(estimator: &mut Estimator, frame: &SyntheticFrame) -> (StepReport, Optio
         gimbal_imu: &[],
         joint_angles: joints.as_ref(),
         tracks: &frame.tracks,
-        rigid_tracks: &[],
+        further_tracks: &[],
     });
     let rank = report.linearization.as_ref().and_then(|linearization| {
         let angles: Vec<&[f64]> = report.window.iter().map(|frame| frame.joint_angles_rad.as_slice()).collect();
