@@ -1,8 +1,8 @@
 use crate::frontend::{TrackedFeature, TrackedFrame};
 use crate::sensors::{ImuSample, JointAngles};
 
-/// First index of the frames at images of the second camera of a run without one of the main camera, twice that of those of
-/// the third: larger than any index of the main camera's images.
+/// First index of the frames that have an image of the second camera of a run and none of the main one; for the third
+/// camera it is twice as large. Larger than any index of the main camera's images.
 pub const OTHER_CAMERA_FRAMES: usize = 1 << 30;
 
 /// Measurements of one image as input of the estimator.

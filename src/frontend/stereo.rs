@@ -1,7 +1,7 @@
 //! Features of one camera in the image that another camera of a stereo pair takes at the same moment.
 //!
-//! The first match of a feature is searched for along its epipolar curve, at inverse distances from zero to that of the
-//! nearest object, by the normalized correlation of small patches on a coarse level of the pyramid; later ones start at the
+//! The first match of a feature is searched for along its epipolar curve, at inverse distances from zero to one over two
+//! and a half baselines, by the normalized correlation of small patches on a coarse level of the pyramid; later ones start at the
 //! inverse distance of the last one. Each is refined on all levels, compared with the window of the feature, and rejected
 //! if its epipolar distance is larger than the uncertainty of the relative pose allows.
 
@@ -55,6 +55,9 @@ pub struct StereoMatcher {
     now: Pyramid,
     /// Inverse distances of the matches in the last image, in 1/m.
     known_per_m: BTreeMap<FeatureId, f64>,
+    /// Angle across the epipolar curve up to which matches are searched for, to both sides of it and at negative distances as
+    /// well; `None` if the pose is trusted.
+    untrusted_rad: Option<f64>,
 }
 
 impl StereoMatcher {
@@ -67,12 +70,20 @@ impl StereoMatcher {
             reference: ReferenceOptions::default(),
             now: Pyramid::default(),
             known_per_m: BTreeMap::new(),
+            untrusted_rad: None,
         }
     }
 
+    /// Matcher that checks the pose: it searches up to this angle across the epipolar curves, and in their continuation beyond
+    /// infinity, and accepts matches that contradict the pose.
+    #[must_use]
+    pub fn untrusting(self, across_rad: f64) -> Self {
+        Self { untrusted_rad: Some(across_rad), ..self }
+    }
+
     /// Observations of `features`, found in the image with the pyramid `own`, in the image of the other camera at the same
-    /// moment; those without a match are missing. Ids and ages are those of the features, bearings in the frame of the
-    /// other camera.
+    /// moment; a feature without a match is missing. Each has the id and the age of its feature, and its bearing in the frame
+    /// of the other camera.
     ///
     /// Empty if the image does not have the size of the camera's.
     pub fn match_features(
@@ -92,8 +103,8 @@ impl StereoMatcher {
         let mut matches = Vec::new();
         for feature in features {
             let guess = match known_per_m.get(&feature.id) {
-                Some(known) => self.pixel_at(feature, *known),
-                None => self.search(own, feature),
+                Some(known) if self.untrusted_rad.is_none() => self.pixel_at(feature, *known),
+                _ => self.search(own, feature),
             };
             let found = guess.and_then(|guess| self.refine(own, feature, &guess, &mut buffers, &mut search));
             if let Some((found, inverse_distance_per_m)) = found {
@@ -112,7 +123,7 @@ impl StereoMatcher {
         self.camera.model.contains(&uv_px, 0.0).then_some(uv_px)
     }
 
-    /// Pixel on the epipolar curve whose neighbourhood correlates best with that of the feature.
+    /// Pixel on the epipolar curve whose neighbourhood correlates best with the feature's.
     fn search(&self, own: &Pyramid, feature: &TrackedFeature) -> Option<Vector2<f64>> {
         let level = SEARCH_LEVEL.min(own.levels().len().min(self.now.levels().len()).checked_sub(1)?);
         let scale = f64::from(1_u32 << level);
@@ -121,14 +132,25 @@ impl StereoMatcher {
         let far = self.pixel_at(feature, 0.0);
         let near = self.pixel_at(feature, nearest_per_m);
         let length_px = far.zip(near).map_or(scale * MAX_CANDIDATES as f64, |(far, near)| (far - near).norm());
-        let count = ((length_px / scale).ceil() as usize).clamp(1, MAX_CANDIDATES);
+        let count = ((length_px / scale).ceil() as i32).clamp(1, MAX_CANDIDATES as i32);
+        let across_px = self.untrusted_rad.unwrap_or(0.0) * self.camera.model.focal_length_px();
+        let steps = (across_px / scale).ceil() as i32;
+        let first = if self.untrusted_rad.is_some() { -count } else { 0 };
+        let across = far.zip(near).map_or_else(Vector2::y, |(far, near)| {
+            let along = near - far;
+            Vector2::new(-along.y, along.x).try_normalize(1e-9).unwrap_or_else(Vector2::y)
+        });
         let mut best: Option<(f64, Vector2<f64>)> = None;
-        for candidate in 0..=count {
-            let Some(uv_px) = self.pixel_at(feature, nearest_per_m * candidate as f64 / count as f64) else { continue };
-            let other = Patch::cut(&self.now.levels()[level], &(uv_px / scale));
-            let Some(correlation) = other.map(|other| patch.correlation(&other)) else { continue };
-            if correlation >= MIN_CORRELATION && best.is_none_or(|(highest, _)| correlation > highest) {
-                best = Some((correlation, uv_px));
+        for candidate in first..=count {
+            let inverse_distance_per_m = nearest_per_m * f64::from(candidate) / f64::from(count);
+            let Some(on_curve_px) = self.pixel_at(feature, inverse_distance_per_m) else { continue };
+            for step in -steps..=steps {
+                let uv_px = on_curve_px + across * (f64::from(step) * scale);
+                let other = Patch::cut(&self.now.levels()[level], &(uv_px / scale));
+                let Some(correlation) = other.map(|other| patch.correlation(&other)) else { continue };
+                if correlation >= MIN_CORRELATION && best.is_none_or(|(highest, _)| correlation > highest) {
+                    best = Some((correlation, uv_px));
+                }
             }
         }
         best.map(|(_, uv_px)| uv_px)
@@ -152,6 +174,11 @@ impl StereoMatcher {
             return None;
         }
         let bearing = self.camera.model.unproject(&uv_px)?;
+        let inverse_distance_per_m = self.inverse_distance_per_m(&feature.bearing, &bearing);
+        let matched = TrackedFeature { uv_px, bearing, previous_uv_px: None, ..*feature };
+        if self.untrusted_rad.is_some() {
+            return Some((matched, inverse_distance_per_m));
+        }
         let pose = &self.camera.here_from_features;
         let pair = BearingPair { previous: feature.bearing, now: bearing };
         let direction = pose.translation_m.normalize();
@@ -160,8 +187,7 @@ impl StereoMatcher {
         if epipolar_distance(&pair, &pose.rotation, &direction) > largest_rad {
             return None;
         }
-        let inverse_distance_per_m = self.inverse_distance_per_m(&feature.bearing, &bearing);
-        Some((TrackedFeature { uv_px, bearing, previous_uv_px: None, ..*feature }, inverse_distance_per_m))
+        Some((matched, inverse_distance_per_m))
     }
 
     /// Inverse distance of a point from the camera of the features, in 1/m, by its bearings in both cameras:

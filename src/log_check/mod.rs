@@ -12,6 +12,7 @@ mod images;
 mod imu;
 mod isolation;
 mod noise;
+mod pairs;
 mod permutations;
 mod report;
 mod rig_sanity;
@@ -31,6 +32,7 @@ pub use self::isolation::{AGREEING_MISFIT, LARGEST_MISFIT};
 pub use self::noise::{
     AllanPoint, AllanReport, AxisNoise, GivenNoise, NoiseTerm, NoiseTerms, SensorNoise, measure_noise,
 };
+pub use self::pairs::{PairMatches, PairMeasurement, median_apart_s};
 pub use self::report::agreement::{Agreement, PairAgreement, Quantity};
 pub(crate) use self::report::verdict::MOST_LIKELY;
 pub use self::report::verdict::{Trust, Verdict, joint_statement, problems};

@@ -99,8 +99,8 @@ pub(super) fn from_stereo(
     })
 }
 
-/// Standard deviation of the scale at a distance, from those of the baseline's length and of the relative orientation, which
-/// shifts the disparity of every point.
+/// Standard deviation of the scale at a distance, from the uncertainty of the baseline's length and of the relative
+/// orientation, which shifts the disparity of every point.
 fn scale_sigma(pair: &StereoPair, distance_m: f64) -> f64 {
     let baseline_m = pair.camera_from_other.translation_m.norm();
     let (translation_m, rotation_rad) = pair.sigmas;
@@ -121,8 +121,8 @@ fn points(frame: &InitializationFrame<'_>, pair: &StereoPair, sigma_per_m: f64) 
     frame.features.iter().filter_map(point).collect()
 }
 
-/// Poses of the camera relative to the one of the first frame, which is the first of the result; the standard deviation is
-/// that of the points' inverse distances.
+/// Poses of the camera relative to the one of the first frame, which is the first of the result; the standard deviation
+/// belongs to the points' inverse distances.
 fn camera_poses(
     frames: &[InitializationFrame<'_>],
     points: &[(TrackedFeature, Vector3<f64>)],

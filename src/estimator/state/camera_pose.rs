@@ -86,7 +86,7 @@ impl CameraCalibration<'_> {
 
 impl Calibrations {
     /// Extrinsics, time offset and shutter of the cameras that observe the features of a camera, over its
-    /// [`Self::pose_columns`]: its own, and those of the other camera of its pair.
+    /// [`Self::pose_columns`]: its own, and the other one of its pair.
     pub(crate) fn sensor_models(&self, camera: usize) -> Vec<CameraCalibration<'_>> {
         self.observers(camera).map(|observer| self.sensor_model(observer)).collect()
     }

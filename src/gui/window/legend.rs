@@ -197,7 +197,7 @@ fn lane_ui(ui: &mut Ui, ctx: &PanelContext<'_>, number: usize, lane: &Trajectory
 
 /// Specification and accuracy of a run.
 fn details(run: &RunRecord, statistics: Option<&ErrorStatistics>) -> String {
-    let mut lines = vec![format!("--run {}", run.spec), format!("camera {}", run.camera_key)];
+    let mut lines = vec![format!("--run {}", run.spec), format!("camera {}", run.last_camera_keys().join(", "))];
     if let Some(origin) = &run.origin {
         let time_s = crate::geometry::seconds_from_ns(origin.stamp_ns);
         lines.push(format!("fork at {time_s:.3} s: {}", origin.changes));

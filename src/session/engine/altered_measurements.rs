@@ -48,6 +48,11 @@ impl AlteredMeasurements {
         self.encoder_off
     }
 
+    /// True if the images of a camera are not used.
+    pub(super) fn is_disabled(&self, camera: usize) -> bool {
+        self.disabled_cameras.contains(&camera)
+    }
+
     /// The corrected tracks of a camera without the dropped features, `None` where nothing is changed.
     pub(super) fn tracks(&self, camera: usize, tracks: &TrackedFrame) -> Option<TrackedFrame> {
         let corrected = if camera == 0 { self.corrections.tracks(tracks) } else { None };
@@ -56,7 +61,7 @@ impl AlteredMeasurements {
 
     /// The tracks without the dropped features, `None` where no feature is dropped.
     fn kept(&self, camera: usize, tracks: &TrackedFrame) -> Option<TrackedFrame> {
-        let disabled = self.disabled_cameras.contains(&camera);
+        let disabled = self.is_disabled(camera);
         let gone = |id: FeatureId| disabled || self.dropped.contains(&id.of_camera(camera).0);
         tracks.features.iter().any(|feature| gone(feature.id)).then(|| {
             let mut kept = tracks.clone();

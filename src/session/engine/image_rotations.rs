@@ -6,6 +6,7 @@ use std::sync::Arc;
 use nalgebra::{UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
+use super::stereo_pairs::stereo_pairs;
 use crate::camera::CameraModel;
 use crate::estimator::initialization::relative_pose::{RotationPrior, relative_poses};
 use crate::flight_log::{FlightLog, FrameStream, ImageReader, LogError, MessageKind};
@@ -31,9 +32,11 @@ const ROTATION_SIGMA_RAD: f64 = 0.3;
 const MIN_PAIRS: usize = 30;
 const MIN_INLIER_RATIO: f64 = 0.6;
 
-/// Checks a log against its rig with the rotations between its images.
+/// Checks a log against its rig with the rotations between its images and the matches of its stereo pairs.
 pub fn check_log(log: &Arc<FlightLog>, rig: &Rig) -> CheckReport {
-    log_check::check(log, Ok(rig), &image_rotations(log, rig))
+    let mut report = log_check::check(log, Ok(rig), &image_rotations(log, rig));
+    report.add_pairs(rig, &stereo_pairs(log, rig));
+    report
 }
 
 /// Rotations between consecutive images of some sections of the log, for every camera of the rig that the log has.

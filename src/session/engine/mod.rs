@@ -23,6 +23,7 @@ mod recompute;
 mod run_engine;
 mod shifted_imu;
 mod step_inputs;
+mod stereo_pairs;
 mod stopwatch;
 mod threads;
 mod tracker;

@@ -133,13 +133,18 @@ impl RunEngine {
 
     fn estimate(&mut self, input: &OwnedStepInput) -> StepReport {
         let unread = self.settings.altered_measurements.corrections.begin_step(input.stamp_ns);
+        let alterations = &self.settings.altered_measurements;
         let altered: Vec<Cow<'_, TrackedFrame>> = input
             .tracks
             .iter()
             .enumerate()
-            .map(|(camera, tracks)| match self.settings.altered_measurements.tracks(camera, tracks) {
-                Some(altered) => Cow::Owned(altered),
-                None => Cow::Borrowed(&**tracks),
+            .map(|(camera, tracks)| {
+                let altered = alterations.tracks(camera, tracks).map_or(Cow::Borrowed(&**tracks), Cow::Owned);
+                let partner = self.estimator.config().partner(camera);
+                if partner.is_some_and(|partner| alterations.is_disabled(partner)) && !altered.matched.is_empty() {
+                    return Cow::Owned(TrackedFrame { matched: Vec::new(), ..altered.into_owned() });
+                }
+                altered
             })
             .collect();
         let further: Vec<&TrackedFrame> = altered.iter().skip(1).map(Cow::as_ref).collect();

@@ -13,7 +13,7 @@ use super::trajectories::{self, LoadedPositions, LoadedTrajectory, LoadedTruth};
 use super::trajectory_spec::{TrajectorySource, TrajectorySpec};
 use crate::estimator::pose_columns;
 use crate::files::LogLimits;
-use crate::flight_log::{FlightLog, is_batch_reference};
+use crate::flight_log::{FlightLog, MessageKind, is_batch_reference};
 use crate::geometry::{RigidTransform, seconds_from_ns};
 use crate::gimbal::{Chain, ParameterId, Parameterization};
 use crate::sensors::{CameraMount, CameraRig, LeverArm, PoseTrack, Rig};
@@ -113,6 +113,9 @@ impl SessionPlan {
             return Err(SessionError::TooManyRuns { count: specs.len() });
         }
         distinct_labels(&mut specs);
+        for spec in &mut specs {
+            name_recorded_cameras(&log, &rig, spec);
+        }
         let runs = specs
             .into_iter()
             .map(|spec| cameras_of_run(&rig, &spec).map(|cameras| (spec, cameras.main.key.clone())))
@@ -230,6 +233,20 @@ pub(in crate::session) fn cameras_of_run<'rig>(
         None => (rig.cameras.iter().find(is_gimballed), "a camera with mount: gimbal".to_owned()),
     };
     Ok(RunCameras { main: main.ok_or_else(|| refused(wanted))?, others: Vec::new() })
+}
+
+/// Names the cameras of a cluster of all cameras that the log has, if it lacks the images of others.
+fn name_recorded_cameras(log: &FlightLog, rig: &Rig, spec: &mut RunSpec) {
+    if spec.parameterization != ParameterizationChoice::Cluster || !spec.cluster_keys.is_empty() {
+        return;
+    }
+    let is_recorded = |camera: &&CameraRig| {
+        log.require_topic(&format!("{}.rostopic", camera.key), &camera.topic, &MessageKind::IMAGES).is_ok()
+    };
+    let recorded: Vec<&CameraRig> = rig.cameras.iter().filter(is_recorded).collect();
+    if recorded.len() > 1 && recorded.len() < rig.cameras.len() {
+        spec.cluster_keys = recorded.into_iter().map(|camera| camera.key.clone()).collect();
+    }
 }
 
 /// Cameras of a cluster: those that it names, else all; the one on the gimbal is the main one.

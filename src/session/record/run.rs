@@ -204,7 +204,7 @@ impl RunRecord {
     }
 
     /// Keys of the cameras of its last step, the main one first.
-    pub(in crate::session) fn last_camera_keys(&self) -> Vec<&str> {
+    pub fn last_camera_keys(&self) -> Vec<&str> {
         let main = || vec![self.camera_key.as_str()];
         self.steps.last().map_or_else(main, |step| self.camera_keys(&step.report.calibration))
     }
