@@ -269,17 +269,13 @@ impl PairFit {
             direction: second_from_first.translation_m.normalize(),
             delay_s: 0.0,
         };
-        let mut pose = start;
-        let mut last = None;
-        for scale in SCALES {
-            let linearize = |pose: &PairPose| Some(equations(pose, matches, scale * BEARING_SIGMA_RAD));
-            gauss_newton(&mut pose, ROUNDS, linearize, |pose, step: &SVector<f64, 6>| {
-                *pose = pose.plus(step);
-                step.norm() < CONVERGED
-            })?;
-            last = Some(equations(&pose, matches, scale * BEARING_SIGMA_RAD));
-        }
-        let information = last?.hessian * BEARING_SIGMA_RAD.powi(-2);
+        // A pose that is nearly right is lost at large scales, at which wrong matches count; a wrong one needs them.
+        let fits = (0..SCALES.len()).filter_map(|first| fitted(&start, matches, &SCALES[first..]));
+        let last_rad = SCALES[SCALES.len() - 1] * BEARING_SIGMA_RAD;
+        let cost =
+            |pose: &PairPose| residuals(pose, matches).map(|rad| 1.0 - 1.0 / (1.0 + (rad / last_rad).powi(2))).sum();
+        let pose = fits.map(|pose| (cost(&pose), pose)).min_by(|one: &(f64, _), other| one.0.total_cmp(&other.0))?.1;
+        let information = equations(&pose, matches, last_rad).hessian * BEARING_SIGMA_RAD.powi(-2);
         let residual_rad = median(residuals(&pose, matches).map(f64::abs))?;
         // The median of the absolute value of a normal variable is 0.6745 of its standard deviation.
         let inflation = (residual_rad / (0.6745 * BEARING_SIGMA_RAD)).max(0.3);
@@ -339,6 +335,19 @@ impl PairPose {
             Vector6::new(by_rotation.x, by_rotation.y, by_rotation.z, by_direction.x, by_direction.y, by_delay);
         (e / length, jacobian / length)
     }
+}
+
+/// Fit at these scales of the loss one after the other.
+fn fitted(start: &PairPose, matches: &[PairMatches], scales: &[f64]) -> Option<PairPose> {
+    let mut pose = *start;
+    for scale in scales {
+        let linearize = |pose: &PairPose| Some(equations(pose, matches, scale * BEARING_SIGMA_RAD));
+        gauss_newton(&mut pose, ROUNDS, linearize, |pose, step: &SVector<f64, 6>| {
+            *pose = pose.plus(step);
+            step.norm() < CONVERGED
+        })?;
+    }
+    Some(pose)
 }
 
 fn residuals<'a>(pose: &'a PairPose, matches: &'a [PairMatches]) -> impl Iterator<Item = f64> + 'a {
@@ -463,7 +472,7 @@ mod tests {
     fn stamps_are_compared_with_the_nearest_ones() {
         let first: Vec<i64> = (0..10).map(|number| number * 100_000_000).collect();
         let later: Vec<i64> = first.iter().map(|stamp_ns| stamp_ns + 11_000_000).collect();
-        assert_eq!(median_apart_s(&first, &later), Some(0.011));
+        assert!(median_apart_s(&first, &later).is_some_and(|apart_s| (apart_s - 0.011).abs() < 1e-12));
         assert_eq!(median_apart_s(&first, &[]), None);
     }
 }

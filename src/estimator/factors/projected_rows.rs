@@ -71,7 +71,7 @@ impl ProjectedRows {
                 local.push(&term);
             }
             local.eliminate();
-            if apart == NewestRows::Apart && first.slot != newest {
+            if apart == NewestRows::Apart {
                 // Observations are in ascending order: the rows of the newest frame are conditioned on all others.
                 let of_newest = |blocks: &[usize]| blocks.last().is_some_and(|block| slot_of(*block) == newest);
                 for (added, of_added) in local.added().filter(|(_, blocks)| of_newest(blocks)) {
