@@ -34,6 +34,6 @@ pub use prediction::{
 };
 pub use pyramid::Pyramid;
 pub use reference::ReferenceOptions;
-pub use stereo::{StereoCamera, StereoMatcher};
+pub use stereo::{StereoCamera, StereoMatcher, inverse_distance_per_m};
 pub(crate) use tracks::ObservedPixel;
 pub use tracks::{FeatureId, FrontEndStatistics, TrackedFeature, TrackedFrame};

@@ -174,7 +174,8 @@ impl StereoMatcher {
             return None;
         }
         let bearing = self.camera.model.unproject(&uv_px)?;
-        let inverse_distance_per_m = self.inverse_distance_per_m(&feature.bearing, &bearing);
+        let inverse = inverse_distance_per_m(&self.camera.here_from_features, &feature.bearing, &bearing);
+        let inverse_distance_per_m = if inverse.is_finite() { inverse.max(0.0) } else { 0.0 };
         let matched = TrackedFeature { uv_px, bearing, previous_uv_px: None, ..*feature };
         if self.untrusted_rad.is_some() {
             return Some((matched, inverse_distance_per_m));
@@ -189,21 +190,17 @@ impl StereoMatcher {
         }
         Some((matched, inverse_distance_per_m))
     }
+}
 
-    /// Inverse distance of a point from the camera of the features, in 1/m, by its bearings in both cameras:
-    ///
-    /// ```text
-    /// s b' = R b + λ t    ⇒    λ = −(b' × R b)·(b' × t) / |b' × t|²
-    /// ```
-    ///
-    /// Zero for a point that seems farther than infinity.
-    fn inverse_distance_per_m(&self, bearing: &Vector3<f64>, there: &Vector3<f64>) -> f64 {
-        let pose = &self.camera.here_from_features;
-        let across = there.cross(&pose.translation_m);
-        let squared = across.norm_squared();
-        let inverse = -there.cross(&(pose.rotation * bearing)).dot(&across) / squared;
-        if inverse.is_finite() { inverse.max(0.0) } else { 0.0 }
-    }
+/// Inverse distance of a point from the camera of the features, in 1/m, by its unit bearings there and in the other camera
+/// `here`; negative for a point that seems farther than infinity, NaN in the direction of the baseline:
+///
+/// ```text
+/// s b' = R b + λ t    ⇒    λ = −(b' × R b)·(b' × t) / |b' × t|²
+/// ```
+pub fn inverse_distance_per_m(here_from_features: &RigidTransform, bearing: &Vector3<f64>, here: &Vector3<f64>) -> f64 {
+    let across = here.cross(&here_from_features.translation_m);
+    -here.cross(&(here_from_features.rotation * bearing)).dot(&across) / across.norm_squared()
 }
 
 /// Side of a patch in pixels.

@@ -42,7 +42,7 @@ pub struct PairMeasurement {
     pub distance_ratios: Vec<(f64, f64)>,
 }
 
-/// Largest time between the images of one moment: those of a pair that is triggered together.
+/// Largest time between the images of a pair that is triggered together.
 const TOGETHER_S: f64 = 0.0005;
 /// Smallest number of matches and of images with them for a fit.
 const MIN_MATCHES: usize = 100;

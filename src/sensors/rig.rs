@@ -319,16 +319,19 @@ impl Rig {
 
     /// Nearest camera before another one with the same mount.
     pub fn camera_before(&self, camera: &CameraRig) -> Option<&CameraRig> {
+        self.cameras_before(camera).last()
+    }
+
+    fn cameras_before(&self, camera: &CameraRig) -> impl Iterator<Item = &CameraRig> {
         let before = self.cameras.iter().take_while(|other| other.key != camera.key);
-        before.filter(|other| other.is_on_gimbal() == camera.is_on_gimbal()).last()
+        before.filter(|other| other.is_on_gimbal() == camera.is_on_gimbal())
     }
 
     /// Camera relative to which the pose of another one is known: the nearest one before it with the same mount whose pose
     /// is known relative to the IMU. `None` if the pose of `camera` itself is.
     pub fn base_of(&self, camera: &CameraRig) -> Option<&CameraRig> {
         camera.relative_prior?;
-        let before = self.cameras.iter().take_while(|other| other.key != camera.key);
-        before.filter(|other| other.relative_prior.is_none() && other.is_on_gimbal() == camera.is_on_gimbal()).last()
+        self.cameras_before(camera).filter(|other| other.relative_prior.is_none()).last()
     }
 
     /// Other camera of the stereo pair of a rigid camera: the first one mounted beside it that sees a part of its field of

@@ -35,7 +35,7 @@ const MIN_INLIER_RATIO: f64 = 0.6;
 /// Checks a log against its rig with the rotations between its images and the matches of its stereo pairs.
 pub fn check_log(log: &Arc<FlightLog>, rig: &Rig) -> CheckReport {
     let mut report = log_check::check(log, Ok(rig), &image_rotations(log, rig));
-    report.add_pairs(rig, &stereo_pairs(log, rig));
+    report.add_pairs(rig, &stereo_pairs(log, &without_joint_topic(rig)));
     report
 }
 
@@ -44,12 +44,7 @@ pub fn check_log(log: &Arc<FlightLog>, rig: &Rig) -> CheckReport {
 /// They do not depend on gyroscope, encoders and extrinsics. A camera whose images cannot be read has none; `check`
 /// reports the reason.
 pub fn image_rotations(log: &Arc<FlightLog>, rig: &Rig) -> Vec<ImageRotation> {
-    // An unreadable topic of joint angles must not prevent reading the images.
-    let mut rig = rig.clone();
-    if let Some(gimbal) = &mut rig.gimbal {
-        gimbal.topic = None;
-    }
-    let rig = &rig;
+    let rig = &without_joint_topic(rig);
     let jobs: Vec<(&CameraRig, f64, f64)> = rig
         .cameras
         .iter()
@@ -66,6 +61,15 @@ pub fn image_rotations(log: &Arc<FlightLog>, rig: &Rig) -> Vec<ImageRotation> {
         .map(|(camera, start_s, length_s)| rotations_of(log, rig, camera, *start_s, *length_s))
         .collect();
     found.into_iter().flatten().collect()
+}
+
+/// The rig without joint angles: an unreadable topic of them must not prevent reading the images.
+fn without_joint_topic(rig: &Rig) -> Rig {
+    let mut rig = rig.clone();
+    if let Some(gimbal) = &mut rig.gimbal {
+        gimbal.topic = None;
+    }
+    rig
 }
 
 /// First stamp and duration of a camera's images in camera time, in seconds: start and duration of the log, unless the

@@ -17,6 +17,7 @@ mod frame_camera;
 mod frame_sets;
 mod history;
 mod image_rotations;
+mod partner_images;
 mod passes;
 mod planned_flight;
 mod recompute;

@@ -7,13 +7,16 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::frame_camera::TOGETHER_NS;
+use super::partner_images::PartnerImages;
 use crate::estimator::initialization::{
     InitializationFrame, InitializationInput, InitializationOptions, InitializationOutcome, InitializationSolution,
     try_initialize,
 };
 use crate::flight_log::{FlightLog, FrameStream, SensorFrame, image_stamps};
 use crate::frontend::corners::CornerOptions;
-use crate::frontend::{FeatureId, FrontEnd, FrontEndOptions, StereoCamera, StereoMatcher, TrackedFrame};
+use crate::frontend::{
+    FeatureId, FrontEnd, FrontEndOptions, StereoCamera, StereoMatcher, TrackedFrame, inverse_distance_per_m,
+};
 use crate::geometry::{median, ns_from_seconds, seconds_from_ns};
 use crate::log_check::{PairMatches, PairMeasurement, median_apart_s};
 use crate::sensors::{CameraMount, CameraRig, Rig};
@@ -32,15 +35,10 @@ const PIXEL_SIGMA_PX: f64 = 0.5;
 /// Smallest number of landmarks whose distances by motion and by the pair are compared.
 const MIN_LANDMARKS: usize = 12;
 
-/// Measurements of the stereo pairs of a rig; a pair whose images cannot be read has no matches.
+/// Measurements of the stereo pairs of a rig without joint angles, whose topic may be unreadable; a pair whose images cannot be read has no matches.
 pub(super) fn stereo_pairs(log: &Arc<FlightLog>, rig: &Rig) -> Vec<PairMeasurement> {
-    // An unreadable topic of joint angles must not prevent reading the images.
-    let mut rig = rig.clone();
-    if let Some(gimbal) = &mut rig.gimbal {
-        gimbal.topic = None;
-    }
     let pairs = rig.cameras.iter().filter_map(|camera| Some([camera, rig.stereo_partner(camera)?]));
-    pairs.map(|cameras| measurement(log, &rig, cameras)).collect()
+    pairs.map(|cameras| measurement(log, rig, cameras)).collect()
 }
 
 fn measurement(log: &Arc<FlightLog>, rig: &Rig, cameras: [&CameraRig; 2]) -> PairMeasurement {
@@ -83,7 +81,7 @@ struct Frame {
 fn section(log: &Arc<FlightLog>, rig: &Rig, cameras: [&CameraRig; 2], start_s: f64, length_s: f64) -> Section {
     let [first, second] = cameras;
     let stream = |camera: &CameraRig| FrameStream::new(Arc::clone(log), rig, &camera.key, start_s, Some(length_s));
-    let (Ok(mut stream), Ok(mut others)) = (stream(first), stream(second)) else { return Section::default() };
+    let (Ok(mut stream), Ok(others)) = (stream(first), stream(second)) else { return Section::default() };
     let Some(first_from_second) = rig.base_from_camera(Some(&first.key), &second.key) else {
         return Section::default();
     };
@@ -98,20 +96,13 @@ fn section(log: &Arc<FlightLog>, rig: &Rig, cameras: [&CameraRig; 2], start_s: f
         orientation_sigma_rad: 0.0,
     };
     let mut matcher = StereoMatcher::new(first.model.clone(), camera).untrusting(ACROSS_RAD);
-    let (mut frames, mut next): (Vec<Frame>, Option<SensorFrame>) = (Vec::new(), None);
-    let stamp_ns = |frame: &SensorFrame| frame.imu.last().map_or(i64::MIN, |last| last.stamp_ns);
+    let mut others = PartnerImages::new(others);
+    let mut frames: Vec<Frame> = Vec::new();
     while let Some(frame) = stream.next_frame() {
         let Ok(tracks) = front_end.process(&frame.image, frame.stamp_ns, None) else { continue };
-        let at_ns = stamp_ns(&frame);
-        while next.as_ref().is_none_or(|next| stamp_ns(next) < at_ns - TOGETHER_NS) {
-            next = others.next_frame();
-            if next.is_none() {
-                break;
-            }
-        }
         let mut matched = BTreeMap::new();
         if frames.len().is_multiple_of(MATCH_EVERY)
-            && let Some(other) = next.as_ref().filter(|next| stamp_ns(next) <= at_ns + TOGETHER_NS)
+            && let Some(other) = others.of_moment(&frame)
         {
             let found = matcher.match_features(front_end.last_image(), &other.image, &tracks.features);
             matched.extend(found.into_iter().map(|feature| (feature.id, feature.bearing)));
@@ -186,11 +177,9 @@ fn distance_ratio(
             let Ok(place) = frame.tracks.features.binary_search_by_key(&landmark.id, |feature| feature.id) else {
                 continue;
             };
-            // s b' = R b + λ t
-            let across = there.cross(&second_from_first.translation_m);
-            let rotated = second_from_first.rotation * frame.tracks.features[place].bearing;
-            let inverse_distance_per_m = -there.cross(&rotated).dot(&across) / across.norm_squared();
-            ratios.push((landmark.position_m - camera_m).norm() * inverse_distance_per_m);
+            let bearing = &frame.tracks.features[place].bearing;
+            let inverse_per_m = inverse_distance_per_m(second_from_first, bearing, there);
+            ratios.push((landmark.position_m - camera_m).norm() * inverse_per_m);
         }
     }
     let ratio = median(ratios.iter().copied()).filter(|ratio| *ratio > 0.0)?;

@@ -72,12 +72,10 @@ impl Engine {
                 let (queue, receiver) = sync_channel(FRAME_QUEUE_CAPACITY);
                 queues.entry(&camera.key).or_default().push(queue);
                 frames.push(receiver);
-                let partner = plan.rig.stereo_partner(camera).map(|partner| partner.key.as_str());
-                if let Some(partner) = partner.filter(|partner| cameras.iter().any(|other| other.key == *partner)) {
-                    partners.insert(&camera.key, partner);
-                }
             }
             let mut config = config_with_prior(plan, spec)?;
+            let pairs = cameras.iter().enumerate().filter_map(|(index, camera)| Some((camera, config.partner(index)?)));
+            partners.extend(pairs.map(|(camera, partner)| (camera.key.as_str(), cameras[partner].key.as_str())));
             let has_gimbal_imu = config.gimbal_imu.is_some();
             let frame_camera = FrameCamera::of_run(&plan.log, &cameras, plan.start_s, has_gimbal_imu)?;
             config.frame_camera = frame_camera.map(|found| found.camera);

@@ -4,13 +4,13 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use super::frame_camera::TOGETHER_NS;
+use super::partner_images::PartnerImages;
 use super::step_inputs::OwnedStepInput;
 use super::stopwatch::Stopwatch;
 use crate::flight_log::{FlightLog, FrameStream, LogError, LogWarning, SensorFrame, WarningKind};
 use crate::frontend::{
-    ChainOrientation, FrontEnd, FrontEndOptions, PredictionNoise, StereoCamera, StereoMatcher, TrackedFrame,
-    camera_rates, predict_camera_rotation,
+    ChainOrientation, FrontEnd, FrontEndOptions, PredictionNoise, StereoCamera, StereoMatcher, camera_rates,
+    predict_camera_rotation,
 };
 use crate::gimbal::ClassicalChain;
 use crate::sensors::{CameraMount, CameraRig, ChainPrior, ImuSample, PoseTrack, Rig};
@@ -32,30 +32,10 @@ pub(super) struct CameraTracker {
     ground_truth: Option<Arc<PoseTrack>>,
 }
 
-/// Images of the other camera of a stereo pair.
+/// Matcher with the images of the other camera of a stereo pair.
 struct StereoTracker {
-    stream: FrameStream,
+    images: PartnerImages,
     matcher: StereoMatcher,
-    /// Image that has been read and is not older than the features.
-    next: Option<SensorFrame>,
-}
-
-impl StereoTracker {
-    /// Adds the observations of the features in the image of the same moment, if there is one; `last` is the IMU sample at
-    /// the stamp of the features.
-    fn match_features(&mut self, front_end: &FrontEnd, tracks: &mut TrackedFrame, last: Option<&ImuSample>) {
-        let Some(at_ns) = last.map(|last| last.stamp_ns) else { return };
-        let stamp_ns = |frame: &SensorFrame| frame.imu.last().map_or(i64::MIN, |last| last.stamp_ns);
-        while self.next.as_ref().is_none_or(|next| stamp_ns(next) < at_ns - TOGETHER_NS) {
-            self.next = self.stream.next_frame();
-            if self.next.is_none() {
-                return;
-            }
-        }
-        if let Some(frame) = self.next.take_if(|next| stamp_ns(next) <= at_ns + TOGETHER_NS) {
-            tracks.matched = self.matcher.match_features(front_end.last_image(), &frame.image, &tracks.features);
-        }
-    }
 }
 
 /// Gyroscope that moves with the camera.
@@ -141,9 +121,8 @@ impl CameraTracker {
             orientation_sigma_rad: partner.relative_prior.unwrap_or(ChainPrior::RELATIVE).sigmas().1,
         };
         let stereo = StereoTracker {
-            stream: FrameStream::new(Arc::clone(log), rig, partner_key, start_s, duration_s)?,
+            images: PartnerImages::new(FrameStream::new(Arc::clone(log), rig, partner_key, start_s, duration_s)?),
             matcher: StereoMatcher::new(self.front_end.camera().clone(), camera),
-            next: None,
         };
         Ok(Self { stereo: Some(stereo), ..self })
     }
@@ -185,8 +164,11 @@ impl CameraTracker {
             self.previous_orientation = orientation;
             match self.front_end.process(&frame.image, frame.stamp_ns, predicted.as_ref()) {
                 Ok(mut tracks) => {
-                    if let Some(stereo) = &mut self.stereo {
-                        stereo.match_features(&self.front_end, &mut tracks, frame.imu.last());
+                    if let Some(StereoTracker { images, matcher }) = &mut self.stereo
+                        && let Some(other) = images.of_moment(&frame)
+                    {
+                        let own = self.front_end.last_image();
+                        tracks.matched = matcher.match_features(own, &other.image, &tracks.features);
                     }
                     frame.warnings.append(&mut rejected);
                     let warnings = std::mem::take(&mut frame.warnings);

@@ -16,7 +16,7 @@ use crate::files::LogLimits;
 use crate::flight_log::{FlightLog, MessageKind, is_batch_reference};
 use crate::geometry::{RigidTransform, seconds_from_ns};
 use crate::gimbal::{Chain, ParameterId, Parameterization};
-use crate::sensors::{CameraMount, CameraRig, LeverArm, PoseTrack, Rig};
+use crate::sensors::{CameraRig, LeverArm, PoseTrack, Rig};
 use crate::text::Named as _;
 
 /// The arguments of a session, as on the command line.
@@ -226,11 +226,11 @@ pub(in crate::session) fn cameras_of_run<'rig>(
         return cluster(rig, spec, refused);
     }
     let (main, wanted) = match &spec.camera_key {
-        Some(key) => (with_key(rig, key), format!("camera '{key}'")),
+        Some(key) => (rig.camera(key).ok(), format!("camera '{key}'")),
         None if spec.parameterization == ParameterizationChoice::Static || rig.gimbal.is_none() => {
-            (rig.cameras.iter().find(|camera| !is_gimballed(camera)), "a camera with mount: static".to_owned())
+            (rig.cameras.iter().find(|camera| !camera.is_on_gimbal()), "a camera with mount: static".to_owned())
         }
-        None => (rig.cameras.iter().find(is_gimballed), "a camera with mount: gimbal".to_owned()),
+        None => (rig.cameras.iter().find(|camera| camera.is_on_gimbal()), "a camera with mount: gimbal".to_owned()),
     };
     Ok(RunCameras { main: main.ok_or_else(|| refused(wanted))?, others: Vec::new() })
 }
@@ -256,16 +256,16 @@ fn cluster<'rig>(
     refused: impl Fn(String) -> SessionError,
 ) -> Result<RunCameras<'rig>, SessionError> {
     let named = &spec.cluster_keys;
-    if let Some(unknown) = named.iter().find(|key| with_key(rig, key).is_none()) {
+    if let Some(unknown) = named.iter().find(|key| rig.camera(key).is_err()) {
         return Err(refused(format!("camera '{unknown}'")));
     }
     let is_used = |camera: &&CameraRig| named.is_empty() || named.contains(&camera.key);
     let mut cameras: Vec<&CameraRig> = rig.cameras.iter().filter(is_used).collect();
     let main = if let Some(key) = &spec.camera_key {
-        let camera = cameras.iter().find(|camera| camera.key == *key && is_gimballed(camera));
+        let camera = cameras.iter().find(|camera| camera.key == *key && camera.is_on_gimbal());
         *camera.ok_or_else(|| refused(format!("camera '{key}' with mount: gimbal")))?
     } else {
-        let first = cameras.iter().find(|camera| is_gimballed(camera)).or_else(|| cameras.first());
+        let first = cameras.iter().find(|camera| camera.is_on_gimbal()).or_else(|| cameras.first());
         *first.ok_or_else(|| refused("a camera".to_owned()))?
     };
     cameras.retain(|camera| camera.key != main.key);
@@ -275,15 +275,7 @@ fn cluster<'rig>(
     Ok(RunCameras { main, others: cameras })
 }
 
-fn with_key<'rig>(rig: &'rig Rig, key: &str) -> Option<&'rig CameraRig> {
-    rig.cameras.iter().find(|camera| camera.key == key)
-}
-
-fn is_gimballed(camera: &&CameraRig) -> bool {
-    camera.mount == CameraMount::Gimbal
-}
-
 fn describe(camera: &CameraRig) -> String {
-    let mount = if camera.mount == CameraMount::Gimbal { "gimbal" } else { "static" };
+    let mount = if camera.is_on_gimbal() { "gimbal" } else { "static" };
     format!("{} (mount: {mount})", camera.key)
 }
