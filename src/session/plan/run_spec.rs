@@ -207,6 +207,9 @@ impl FromStr for RunSpec {
         if parameterization != ParameterizationChoice::Cluster && !run.cluster_keys.is_empty() {
             return Err(bad("cameras=… requires a cluster; camera=KEY is the camera of any other run".to_owned()));
         }
+        if run.camera_key.is_some() && !run.cluster_keys.is_empty() {
+            return Err(bad("camera=KEY and cameras=… exclude each other".to_owned()));
+        }
         Ok(run)
     }
 }

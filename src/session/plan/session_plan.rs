@@ -262,6 +262,8 @@ fn cluster<'rig>(
     let is_used = |camera: &&CameraRig| named.is_empty() || named.contains(&camera.key);
     let mut cameras: Vec<&CameraRig> = rig.cameras.iter().filter(is_used).collect();
     let main = if let Some(key) = &spec.camera_key {
+        // Poses of cameras on the gimbal are relative to the first one, which is the main one where there are several.
+        cameras.retain(|camera| camera.key == *key || !camera.is_on_gimbal());
         let camera = cameras.iter().find(|camera| camera.key == *key && camera.is_on_gimbal());
         *camera.ok_or_else(|| refused(format!("camera '{key}' with mount: gimbal")))?
     } else {

@@ -144,6 +144,7 @@ fn a_cluster_uses_the_gimballed_and_the_rigid_camera() {
     assert_eq!(keys("cluster"), ["cam0", "cam1", "cam2"]);
     assert_eq!(keys("cluster:cameras=cam2+cam0"), ["cam0", "cam2"]);
     assert_eq!(keys("cluster:cameras=cam2+cam1"), ["cam1", "cam2"]);
+    assert_eq!(keys("cluster:camera=cam0"), ["cam0", "cam1", "cam2"]);
     let config = estimator_config(&rig, &parse("cluster:cameras=cam0+cam2").unwrap()).unwrap();
     let further: Vec<_> = config.further_cameras.iter().map(|camera| (camera.key.as_str(), camera.number)).collect();
     assert_eq!(further, [("cam2", 2)]);
@@ -152,6 +153,7 @@ fn a_cluster_uses_the_gimballed_and_the_rigid_camera() {
     for (text, problem) in [
         ("auto:cameras=cam0+cam1", "cameras=… requires a cluster"),
         ("cluster:cameras=cam0", "two or more different keys"),
+        ("cluster:camera=cam0,cameras=cam0+cam1", "exclude each other"),
         ("cluster:cameras=cam0+cam0", "two or more different keys"),
     ] {
         let message = text.parse::<RunSpec>().unwrap_err().to_string();
