@@ -3,10 +3,10 @@
 use anyhow::{Result, bail};
 use clap::Args;
 use dcvins::geometry::{ns_from_seconds, seconds_from_ns};
-use dcvins::gui::PanelName;
 use dcvins::gui::comparison::ComparisonView;
 use dcvins::gui::theme::ThemeName;
 use dcvins::gui::window::{FIGURE_FONT_PT, FIGURE_SIDE_MM, FigureSpec};
+use dcvins::gui::{PanelName, ShownCameras};
 use dcvins::session::Recording;
 use dcvins::text::Named as _;
 
@@ -44,6 +44,9 @@ pub(crate) struct FigureArguments {
     /// Run of panels that show one run, by its name.
     #[arg(long, value_name = "NAME")]
     pub shown_run: Option<String>,
+    /// Camera of that run whose image the image panel shows, or `all` [default: the main camera].
+    #[arg(long, value_name = "KEY|all")]
+    pub camera: Option<String>,
 }
 
 fn side_mm(text: &str) -> Result<f64, String> {
@@ -83,6 +86,17 @@ impl FigureArguments {
         }
     }
 
+    /// Cameras of the image panel.
+    pub(crate) fn cameras(&self, recording: &Recording) -> Result<ShownCameras> {
+        let Some(name) = &self.camera else { return Ok(ShownCameras::Main) };
+        let run = &recording.runs[self.run(recording)?];
+        let keys = run.last_camera_keys();
+        if name != "all" && !keys.contains(&name.as_str()) {
+            bail!("--camera {name}: run {} has {}; give one of them or all", run.spec.label, keys.join(", "));
+        }
+        Ok(ShownCameras::of_name(name))
+    }
+
     /// The figure of a panel; `cursor_ns` is the stamp of --at or --every.
     pub(crate) fn spec(
         &self,
@@ -102,6 +116,7 @@ impl FigureArguments {
             panel,
             view: self.view,
             run: self.run(recording)?,
+            cameras: self.cameras(recording)?,
             range_ns: self.range_ns()?,
             cursor_ns,
             width_mm: self.width_mm.unwrap_or(DEFAULT_WIDTH_MM),

@@ -219,10 +219,19 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<ExitOutcome>
     let slide = arguments.slide.as_ref().map(position).transpose()?;
     let playback = shown.playback();
     let run = arguments.figure.run(computation.recording())?;
+    let cameras = arguments.figure.cameras(computation.recording())?;
     let view = arguments.figure.view;
     let motion = shown.motion.clone();
-    let options =
-        ScreenshotOptions { slide, run, view, motion, visible_ns: range_ns, playback, ..drawing_options(arguments) };
+    let options = ScreenshotOptions {
+        slide,
+        run,
+        cameras,
+        view,
+        motion,
+        visible_ns: range_ns,
+        playback,
+        ..drawing_options(arguments)
+    };
     for (number, cursor_ns) in stamps_ns.iter().copied().enumerate() {
         if interrupt.is_set() {
             return stopped(number);

@@ -3,7 +3,7 @@ use crate::sensors::{ImuSample, JointAngles};
 
 /// First index of the frames that have an image of the second camera of a run and none of the main one; for the third
 /// camera it is twice as large. Larger than any index of the main camera's images.
-pub const OTHER_CAMERA_FRAMES: usize = 1 << 30;
+pub const OTHER_CAMERA_FRAMES: usize = 1 << 27;
 
 /// Measurements of one image as input of the estimator.
 #[derive(Clone, Debug)]

@@ -21,7 +21,7 @@ use crate::gui::theme::{Theme, ThemeName};
 use crate::gui::window::{
     FigureFormat, FigureInput, FigureSpec, MainWindow, Panels, Preset, alone_ui, complete, panel_table, window_ui,
 };
-use crate::gui::{ImageSource, PanelContext, PanelName, Playback, Presentation, Selection};
+use crate::gui::{ImageSource, PanelContext, PanelName, Playback, Presentation, Selection, ShownCameras};
 use crate::observability::SlidePosition;
 use crate::session::Recording;
 use crate::simulation::PrescribedMotion;
@@ -68,6 +68,8 @@ pub struct ScreenshotOptions {
     pub renderer: Renderer,
     /// Index of the run in panels that show one run.
     pub run: usize,
+    /// Cameras of that run in the image panel.
+    pub cameras: ShownCameras,
     /// Direction and distance by which the chain of that run is moved.
     pub slide: Option<SlidePosition>,
     /// Layout of the whole window.
@@ -92,6 +94,7 @@ impl Default for ScreenshotOptions {
             theme: ThemeName::Light,
             renderer: Renderer::Cpu,
             run: 0,
+            cameras: ShownCameras::Main,
             slide: None,
             layout: Preset::default(),
             playback: Playback::default(),
@@ -166,7 +169,7 @@ pub fn draw_panel_svg(
     })
 }
 
-/// The values of a panel as CSV; of the options run, slide and motion have an effect.
+/// The values of a panel as CSV; of the options run, cameras, slide and motion have an effect.
 ///
 /// # Errors
 /// If no single panel has this name.
@@ -180,7 +183,8 @@ pub fn panel_csv(
     let panel = PanelName::from_name(name);
     let panel = panel.ok_or_else(|| ScreenshotError::UnknownPanel { name: name.to_owned() })?;
     let theme = Theme::of(options.theme);
-    let mut selection = Selection { run: options.run, slide: options.slide, ..Selection::default() };
+    let (run, slide, cameras) = (options.run, options.slide, options.cameras.clone());
+    let mut selection = Selection { run, cameras, slide, ..Selection::default() };
     let playback = Playback { playing: false, ..options.playback.clone() };
     let (selection, commands, playback, theme) = (&mut selection, &mut Vec::new(), &playback, &theme);
     let presentation = options.presentation;
@@ -212,7 +216,8 @@ fn with_panel<T>(
     panels.borrow_mut().comparison.view = options.view;
     options.open_motion(&mut panels.borrow_mut());
     let (run, slide, visible_ns) = (options.run, options.slide, options.visible_ns);
-    let mut selection = Selection { run, visible_ns, slide, ..Selection::default() };
+    let cameras = options.cameras.clone();
+    let mut selection = Selection { run, cameras, visible_ns, slide, ..Selection::default() };
     let playback = Playback { playing: false, ..options.playback.clone() };
     let presentation = if panel.is_some() { options.presentation } else { Presentation::Interactive };
     let mut ui = |ui: &mut Ui| {
@@ -343,7 +348,7 @@ mod tests {
             let steps: Vec<_> = of_run.iter().filter(|row| !row[phase].is_empty()).collect();
             assert_eq!(steps.len(), record.steps.len(), "{}", record.spec.label);
             for (row, step) in steps.iter().zip(&record.steps) {
-                assert_eq!(row[features], step.tracks.features.len().to_string());
+                assert_eq!(row[features], step.feature_count().to_string());
                 let rank = step.rank.as_ref().filter(|rank| !rank.parameters.is_empty());
                 assert_eq!(row[informed], rank.map_or_else(String::new, |rank| rank.rank_informed.to_string()));
             }

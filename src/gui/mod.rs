@@ -3,6 +3,7 @@
 pub mod app;
 pub mod breakpoints;
 pub mod calibration;
+mod cells;
 pub mod comparison;
 pub mod convergence;
 mod derived;
@@ -41,4 +42,6 @@ mod widgets;
 pub mod window;
 
 pub use derived::reading::{Reading, ReadingCursor};
-pub use panel::{CsvTable, Dialog, ImageSource, Panel, PanelContext, PanelName, Playback, Presentation, Selection};
+pub use panel::{
+    CsvTable, Dialog, ImageSource, Panel, PanelContext, PanelName, Playback, Presentation, Selection, ShownCameras,
+};

@@ -1,5 +1,6 @@
 //! The panels of the window by name, what each of them does, and what it gets and gives in a frame.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use egui::{Role, Sense, Ui};
@@ -41,6 +42,45 @@ pub trait ImageSource {
     fn image(&mut self, camera_key: &str, frame_index: usize) -> FrameImage;
 }
 
+/// Cameras of a run whose images are shown.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum ShownCameras {
+    #[default]
+    Main,
+    /// The camera with a key; in a run without it, the main one.
+    Key(String),
+    /// All side by side.
+    All,
+}
+
+impl ShownCameras {
+    /// `all`, or a key.
+    pub fn of_name(name: &str) -> Self {
+        if name == "all" { Self::All } else { Self::Key(name.to_owned()) }
+    }
+
+    /// The name that [`Self::of_name`] reads; `None` for the main camera.
+    pub fn name(&self) -> Option<&str> {
+        match self {
+            Self::Main => None,
+            Self::Key(key) => Some(key),
+            Self::All => Some("all"),
+        }
+    }
+
+    /// Indices of the shown cameras in the run with cameras of these keys.
+    pub(crate) fn indices(&self, keys: &[&str]) -> Range<usize> {
+        match self {
+            Self::Main => 0..1,
+            Self::Key(shown) => {
+                let index = keys.iter().position(|key| key == shown).unwrap_or(0);
+                index..index + 1
+            }
+            Self::All => 0..keys.len(),
+        }
+    }
+}
+
 /// The selection, common to all panels.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Selection {
@@ -48,6 +88,8 @@ pub struct Selection {
     pub parameter: Option<ParameterId>,
     /// Index of the run in panels that show one run.
     pub run: usize,
+    /// Cameras of runs with several.
+    pub cameras: ShownCameras,
     /// Time range of all plots, in nanoseconds since the log began; `None` for the whole log.
     pub visible_ns: Option<(i64, i64)>,
     /// Direction and distance by which the selected run's chain is moved.

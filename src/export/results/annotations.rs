@@ -1,4 +1,4 @@
-//! Tracks and residuals of a step as annotations of its image.
+//! Tracks and residuals of a step as annotations of its images.
 
 use std::collections::BTreeMap;
 
@@ -26,9 +26,16 @@ struct Solved {
     residual_line_px: Option<[Vector2<f64>; 2]>,
 }
 
-/// Writes a keypoint marker for every track (large for features in the window), its track trail, and its residual after the
-/// solve, predicted minus measured, magnified 20 times.
-pub(super) fn write(log: &mut LogWriter, topic: &str, times: MessageTimes, step: &StepRecord) -> Result<(), LogError> {
+/// Writes a keypoint marker for every track of a camera (large for features in the window), its track trail, and its
+/// residual after the solve, predicted minus measured, magnified 20 times; nothing where the camera has no image.
+pub(super) fn write(
+    log: &mut LogWriter,
+    topic: &str,
+    times: MessageTimes,
+    step: &StepRecord,
+    camera: usize,
+) -> Result<(), LogError> {
+    let Some((_, tracks)) = step.image(camera) else { return Ok(()) };
     let frame_index = step.report.frame_index;
     let mut solved: BTreeMap<FeatureId, Solved> = BTreeMap::new();
     for feature in &step.report.features {
@@ -42,15 +49,16 @@ pub(super) fn write(log: &mut LogWriter, topic: &str, times: MessageTimes, step:
     let mut circles = Vec::new();
     let mut motions = Vec::new();
     let mut residuals = Vec::new();
-    for track in &step.tracks.features {
-        let (diameter_px, color) = match solved.get(&track.id) {
+    for track in &tracks.features {
+        let solved = solved.get(&track.id.of_camera(camera));
+        let (diameter_px, color) = match solved {
             Some(feature) if feature.rejected => (SOLVED_PX, REJECTED),
             Some(_) => (SOLVED_PX, SOLVED),
             None => (TRACKED_PX, TRACKED),
         };
         circles.push(CircleAnnotation { center_px: track.uv_px, diameter_px, color });
         motions.extend(track.previous_uv_px.map(|previous| [previous, track.uv_px]));
-        residuals.extend(solved.get(&track.id).and_then(|feature| feature.residual_line_px));
+        residuals.extend(solved.and_then(|feature| feature.residual_line_px));
     }
     let lines = [
         LinesAnnotation { lines_px: motions, color: TRACKED },

@@ -65,7 +65,13 @@ impl<'a> Results<'a> {
         let times =
             MessageTimes { stamp_ns: self.epoch_ns + report.stamp_ns, log_time_ns: self.epoch_ns + step.log_time_ns };
         self.write_events(step, times)?;
-        annotations::write(&mut self.log, &self.names.topic("annotations"), times, step)?;
+        annotations::write(&mut self.log, &self.names.topic("annotations"), times, step, 0)?;
+        for (further, image) in step.further_images.iter().enumerate() {
+            let Some(camera) = report.calibration.further_cameras.get(further) else { continue };
+            let topic = self.names.topic(&format!("annotations/{}", camera.key));
+            let times = MessageTimes { stamp_ns: self.epoch_ns + image.tracks.stamp_ns, ..times };
+            annotations::write(&mut self.log, &topic, times, step, further + 1)?;
+        }
         self.series.write(&mut self.log, &self.names, times, step)?;
         if let Some(ground_truth) = &step.ground_truth {
             self.log.write_pose(&self.names.topic("truth"), WORLD, times, ground_truth)?;

@@ -1,14 +1,14 @@
 //! Images and scenes of all runs side by side, with one common view.
 
-use egui::{Rect, RichText, Ui, UiBuilder, Vec2, pos2, vec2};
+use egui::{Rect, RichText, Ui, UiBuilder};
 
+use crate::gui::cells::{cells, columns_of_images};
 use crate::gui::image_panel::ImagePanel;
 use crate::gui::scene::ScenePanel;
 use crate::gui::{Panel as _, PanelContext, Selection};
 
 /// Minimum width of a scene's cell in points; below it the cells form two rows.
 const MIN_CELL_WIDTH: f32 = 250.0;
-const GAP: f32 = 6.0;
 /// Height in points of the label above an image, with its gap.
 const LABEL_HEIGHT: f32 = 22.0;
 /// Height in points of the common legend below the images, with its gap.
@@ -34,7 +34,7 @@ impl SideBySideImages {
             let room = ui.available_rect_before_wrap();
             room.split_top_bottom_at_y((room.bottom() - LEGEND_HEIGHT).max(room.top()))
         };
-        let columns = columns_of_images(images.size(), ctx.recording.runs.len());
+        let columns = columns_of_images(images.size(), ctx.recording.runs.len(), LABEL_HEIGHT);
         each_run(ui, ctx, (images, columns), |ui, ctx, run| {
             let panel = &mut panels[run];
             panel.follow(lead);
@@ -116,64 +116,5 @@ fn each_run(
         if selection.parameter != before.parameter {
             ctx.selection.parameter = selection.parameter;
         }
-    }
-}
-
-/// Number of columns with which images are largest in an area.
-fn columns_of_images(area: Vec2, count: usize) -> usize {
-    /// Width over height of most images.
-    const ASPECT: f32 = 4.0 / 3.0;
-    let height = |columns: usize| {
-        let rows = count.div_ceil(columns);
-        let cell = cell_size(area, columns, rows);
-        (cell.y - LABEL_HEIGHT).min(cell.x / ASPECT)
-    };
-    (1..=count.max(1)).max_by(|a, b| height(*a).total_cmp(&height(*b))).unwrap_or(1)
-}
-
-fn cell_size(area: Vec2, columns: usize, rows: usize) -> Vec2 {
-    let side = |whole: f32, parts: usize| (whole - GAP * (parts.max(1) - 1) as f32) / parts.max(1) as f32;
-    vec2(side(area.x, columns), side(area.y, rows))
-}
-
-/// Rectangles of the cells, row by row.
-fn cells(all: Rect, columns: usize, count: usize) -> Vec<Rect> {
-    let columns = columns.max(1);
-    let rows = count.div_ceil(columns);
-    let size = cell_size(all.size(), columns, rows);
-    let place = |run: usize| {
-        let (column, row) = ((run % columns) as f32, (run / columns) as f32);
-        Rect::from_min_size(pos2(all.left() + column * (size.x + GAP), all.top() + row * (size.y + GAP)), size)
-    };
-    (0..count).map(place).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn cells_do_not_overlap_and_stay_inside() {
-        for width in [300.0, 700.0, 1600.0] {
-            let all = Rect::from_min_size(pos2(10.0, 20.0), vec2(width, 400.0));
-            for count in 1..=4 {
-                for columns in 1..=count {
-                    let cells = cells(all, columns, count);
-                    assert_eq!(cells.len(), count);
-                    for (number, cell) in cells.iter().enumerate() {
-                        assert!(all.expand(0.1).contains_rect(*cell) && cell.is_positive());
-                        assert!(cells[..number].iter().all(|other| !other.intersects(cell.shrink(1.0))));
-                    }
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn images_are_as_large_as_possible() {
-        assert_eq!(columns_of_images(vec2(600.0, 200.0), 4), 4, "a low area has one row");
-        assert_eq!(columns_of_images(vec2(600.0, 500.0), 4), 2);
-        assert_eq!(columns_of_images(vec2(200.0, 900.0), 4), 1, "a narrow one has one column");
-        assert_eq!(columns_of_images(vec2(600.0, 200.0), 0), 1);
     }
 }

@@ -1,41 +1,44 @@
-//! Observations in the image at the cursor; one feature per row.
+//! Observations in the shown images; one feature per row.
 
 use super::ImagePanel;
-use crate::estimator::{FeatureReport, ObservationReport};
-use crate::frontend::TrackedFeature;
+use super::model::{FeatureMark, ImageModel, SolveSide, SolvedMark};
 use crate::gui::{CsvTable, PanelContext};
 use crate::table::{Column, csv};
 
-/// A tracked feature, in the solve, and its observation in the image.
-type FeatureRow<'a> = (&'a TrackedFeature, Option<&'a FeatureReport>, Option<ObservationReport>);
-type FeatureColumn<'a> = Column<'a, FeatureRow<'a>>;
+/// A mark with the key of its camera.
+type MarkRow<'a> = (&'a str, &'a FeatureMark);
+type MarkColumn<'a> = Column<'a, MarkRow<'a>>;
 
 impl CsvTable for ImagePanel {
     fn csv_table(&mut self, ctx: &PanelContext<'_>) -> String {
         let Some(run) = ctx.selected_run() else { return String::new() };
-        let columns = [
-            FeatureColumn::new("id", |(tracked, ..)| tracked.id.0),
-            FeatureColumn::new("age_frames", |(tracked, ..)| tracked.age),
-            FeatureColumn::new("u_px", |(tracked, ..)| tracked.uv_px.x),
-            FeatureColumn::new("v_px", |(tracked, ..)| tracked.uv_px.y),
-            FeatureColumn::new("residual_before_u_px", |(.., seen)| Some(seen.as_ref()?.residual_before_px?.x)),
-            FeatureColumn::new("residual_before_v_px", |(.., seen)| Some(seen.as_ref()?.residual_before_px?.y)),
-            FeatureColumn::new("residual_after_u_px", |(.., seen)| Some(seen.as_ref()?.residual_after_px?.x)),
-            FeatureColumn::new("residual_after_v_px", |(.., seen)| Some(seen.as_ref()?.residual_after_px?.y)),
-            FeatureColumn::new("chi2", |(.., seen)| Some(seen.as_ref()?.chi2)),
-            FeatureColumn::new("weight", |(.., seen)| Some(seen.as_ref()?.robust_weight)),
-            FeatureColumn::new("depth_m", |(_, solved, _)| Some(1.0 / (*solved)?.inverse_depth_per_m)),
-            FeatureColumn::new("rejected", |(_, solved, _)| Some((*solved)?.rejected)),
-            FeatureColumn::new("track_weight", |(_, solved, _)| solved.map(FeatureReport::track_weight)),
+        let keys = run.last_camera_keys();
+        let cameras = ctx.selection.cameras.indices(&keys);
+        let models: Vec<ImageModel> =
+            cameras.filter_map(|camera| ImageModel::at(&ctx.recording.rig, run, camera, ctx.cursor_ns)).collect();
+        let residual = |mark: &FeatureMark, side, axis: usize| Some(mark.solved?.residual_px(side)?[axis]);
+        let observed = |mark: &FeatureMark| mark.solved?.observation;
+        let mut columns = vec![
+            MarkColumn::new("id", |(_, mark)| mark.id.0),
+            MarkColumn::new("age_frames", |(_, mark)| mark.age),
+            MarkColumn::new("u_px", |(_, mark)| mark.measured_px.x),
+            MarkColumn::new("v_px", |(_, mark)| mark.measured_px.y),
+            MarkColumn::new("residual_before_u_px", move |(_, mark)| residual(mark, SolveSide::Before, 0)),
+            MarkColumn::new("residual_before_v_px", move |(_, mark)| residual(mark, SolveSide::Before, 1)),
+            MarkColumn::new("residual_after_u_px", move |(_, mark)| residual(mark, SolveSide::After, 0)),
+            MarkColumn::new("residual_after_v_px", move |(_, mark)| residual(mark, SolveSide::After, 1)),
+            MarkColumn::new("chi2", move |(_, mark)| Some(observed(mark)?.chi2)),
+            MarkColumn::new("weight", move |(_, mark)| Some(observed(mark)?.robust_weight)),
+            MarkColumn::new("depth_m", |(_, mark)| Some(mark.solved?.depth_m)),
+            MarkColumn::new("rejected", |(_, mark)| Some(mark.solved?.rejected)),
+            MarkColumn::new("track_weight", |(_, mark)| {
+                mark.solved.map(|SolvedMark { track_weight, .. }| track_weight)
+            }),
         ];
-        let rows = run.step_at(ctx.cursor_ns).into_iter().flat_map(|step| {
-            let frame = step.report.frame_index;
-            step.tracks.features.iter().map(move |tracked| {
-                let solved = step.report.features.iter().find(|solved| solved.id == tracked.id);
-                let seen = solved.and_then(|solved| solved.observations.iter().find(|seen| seen.frame_index == frame));
-                (tracked, solved, seen)
-            })
-        });
+        if keys.len() > 1 {
+            columns.insert(0, MarkColumn::new("camera", |(key, _)| *key));
+        }
+        let rows = models.iter().flat_map(|model| model.marks.iter().map(|mark| (model.camera_key.as_str(), mark)));
         csv(&columns, rows)
     }
 }

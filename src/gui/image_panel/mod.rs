@@ -1,4 +1,4 @@
-//! The camera image with its tracks and residuals.
+//! The images of one or all cameras of a run with their tracks and residuals.
 
 mod csv;
 mod model;
@@ -10,19 +10,22 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use egui::containers::menu::{MenuButton, MenuConfig};
-use egui::{Align2, ColorImage, PopupCloseBehavior, Rect, Sense, TextureHandle, TextureOptions, Ui, Vec2, pos2, vec2};
+use egui::{
+    Align2, ColorImage, PopupCloseBehavior, Rect, Sense, TextureHandle, TextureOptions, Ui, UiBuilder, Vec2, pos2, vec2,
+};
 
 use self::model::ImageModel;
 pub use self::model::SolveSide;
 use self::paint::{ImagePlacement, MarkOptions};
+use super::cells::{cells, columns_of_images};
 use super::help::terms::window;
 use super::plot::pan_zoom::PanZoom;
 use super::under_pointer::{Item, offer, offer_item};
 use super::units::significant;
 use super::widgets::{describe, empty_ui};
-use super::{Panel, PanelContext};
+use super::{Panel, PanelContext, ShownCameras};
 use crate::sensors::{GrayImage, ImageMask};
-use crate::session::FrameImage;
+use crate::session::{FrameImage, RunRecord};
 
 /// Maximum magnification relative to the fitted size.
 const MAX_ZOOM: f32 = 16.0;
@@ -36,15 +39,19 @@ const LEGEND: &str = "Colour: age of the track in frames\nRing: used in the solv
     Line: residual (prediction − measurement), magnified";
 /// Period at which an image that is being decoded is requested again.
 const DECODING_PERIOD: Duration = Duration::from_millis(15);
+/// Largest number of cameras with a button each; with more they are in a list.
+const CAMERA_BUTTONS: usize = 4;
 /// Height of legend and caption in points.
 const LINE_HEIGHT: f32 = 18.0;
 
-/// State of the image panel: options of the overlay, and the visible region of the image.
+/// State of the image panel: options of the overlay, and the visible regions of the images.
 #[derive(Default)]
 pub struct ImagePanel {
     pub(in crate::gui) options: MarkOptions,
-    view: PanZoom,
-    texture: Option<CachedTexture>,
+    /// By camera of the run.
+    views: Vec<PanZoom>,
+    /// By camera of the run.
+    textures: Vec<Option<CachedTexture>>,
 }
 
 struct CachedTexture {
@@ -60,20 +67,37 @@ impl Panel for ImagePanel {
             empty_ui(ui, "No runs");
             return;
         };
-        self.controls_ui(ui, context, &run.spec.label);
-        let Some(model) = ImageModel::at(run, context.cursor_ns) else {
-            empty_ui(ui, "No image at or before the cursor");
-            return;
+        let keys = run.last_camera_keys();
+        self.controls_ui(ui, context, run, &keys);
+        let shown = context.selection.cameras.indices(&keys);
+        let line = LINE_HEIGHT + ui.spacing().item_spacing.y;
+        let (images, legend) = {
+            let room = ui.available_rect_before_wrap();
+            room.split_top_bottom_at_y((room.bottom() - line).max(room.top()))
         };
-        let size = ui.available_size() - vec2(0.0, 2.0 * LINE_HEIGHT + 2.0 * ui.spacing().item_spacing.y);
-        self.content_ui(ui, context, &run.spec.label, &model, size);
-        let moved = context.moved_chain(model.stamp_ns).is_some();
-        self.legend_ui(ui, context, moved);
-        caption_ui(ui, context, &model);
+        let columns = columns_of_images(images.size(), shown.len(), line);
+        let mut moved = false;
+        for (camera, cell) in shown.clone().zip(cells(images, columns, shown.len())) {
+            ui.push_id(camera, |ui| {
+                ui.scope_builder(UiBuilder::new().max_rect(cell), |ui| {
+                    ui.set_clip_rect(ui.clip_rect().intersect(cell));
+                    let Some(model) = ImageModel::at(&context.recording.rig, run, camera, context.cursor_ns) else {
+                        let of_camera = if keys.len() > 1 { format!(" of {}", keys[camera]) } else { String::new() };
+                        empty_ui(ui, &format!("No image{of_camera} at or before the cursor"));
+                        return;
+                    };
+                    let size = ui.available_size() - vec2(0.0, line);
+                    self.content_ui(ui, context, (&run.spec.label, camera), &model, size);
+                    moved |= camera == 0 && context.moved_chain(model.stamp_ns).is_some();
+                    caption_ui(ui, context, &model);
+                });
+            });
+        }
+        ui.scope_builder(UiBuilder::new().max_rect(legend), |ui| self.legend_ui(ui, context, moved));
     }
 
     fn view_copy(&self) -> Self {
-        Self { options: self.options, view: self.view, texture: None }
+        Self { options: self.options, views: self.views.clone(), textures: Vec::new() }
     }
 }
 
@@ -84,7 +108,7 @@ impl ImagePanel {
             if context.presentation.is_figure() {
                 self.side_ui(ui);
             } else {
-                self.choices_ui(ui, mask_of(context).is_some());
+                self.choices_ui(ui, has_mask(context));
             }
         });
     }
@@ -92,7 +116,12 @@ impl ImagePanel {
     /// Draws the image of a run between the images of other runs: label and caption in one line, and the image.
     pub(in crate::gui) fn cell_ui(&mut self, ui: &mut Ui, context: &mut PanelContext<'_>) {
         let Some(run) = context.selected_run() else { return };
-        let model = ImageModel::at(run, context.cursor_ns);
+        // Runs are compared by one camera each.
+        let camera = match &context.selection.cameras {
+            ShownCameras::All => 0,
+            shown => shown.indices(&run.last_camera_keys()).start,
+        };
+        let model = ImageModel::at(&context.recording.rig, run, camera, context.cursor_ns);
         ui.horizontal(|ui| {
             ui.set_height(LINE_HEIGHT);
             ui.colored_label(context.theme.run(context.selection.run).color, &run.spec.label);
@@ -105,7 +134,7 @@ impl ImagePanel {
             return;
         };
         let size = ui.available_size();
-        self.content_ui(ui, context, &run.spec.label, &model, size);
+        self.content_ui(ui, context, (&run.spec.label, camera), &model, size);
     }
 
     /// Draws the legend of the marks in one line.
@@ -116,35 +145,52 @@ impl ImagePanel {
     }
 
     /// Draws the image with its marks in a size in points.
-    fn content_ui(&mut self, ui: &mut Ui, context: &mut PanelContext<'_>, label: &str, model: &ImageModel, size: Vec2) {
+    fn content_ui(
+        &mut self,
+        ui: &mut Ui,
+        context: &mut PanelContext<'_>,
+        (label, camera): (&str, usize),
+        model: &ImageModel,
+        size: Vec2,
+    ) {
         let (area, response) = ui.allocate_exact_size(size.max(Vec2::splat(16.0)), Sense::click_and_drag());
-        let name = format!("Image of {label}");
+        let name = if model.is_only_camera {
+            format!("Image of {label}")
+        } else {
+            format!("Image of {} of {label}", model.camera_key)
+        };
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &name));
         describe(&response, &model.caption());
-        let camera_key = context.selected_run().map_or("", |run| run.camera_key.as_str());
-        let image = context.images.image(camera_key, model.frame_index);
-        self.image_ui(ui, area, &response, context, model, image);
+        let image = context.images.image(&model.camera_key, model.image_index);
+        let cameras = self.views.len().max(camera + 1);
+        self.views.resize_with(cameras, PanZoom::default);
+        self.textures.resize_with(cameras, || None);
+        self.image_ui(ui, (area, camera), &response, context, model, image);
     }
 
     /// Copies the view of another panel.
     pub(in crate::gui) fn follow(&mut self, other: &Self) {
-        (self.options, self.view) = (other.options, other.view);
+        (self.options, self.views) = (other.options, other.views.clone());
     }
 
     /// True if it has the view of another panel.
     pub(in crate::gui) fn looks_like(&self, other: &Self) -> bool {
-        (self.options, self.view) == (other.options, other.view)
+        (self.options, &self.views) == (other.options, &other.views)
     }
 
-    fn controls_ui(&mut self, ui: &mut Ui, context: &PanelContext<'_>, run_label: &str) {
+    fn controls_ui(&mut self, ui: &mut Ui, context: &mut PanelContext<'_>, run: &RunRecord, keys: &[&str]) {
         ui.horizontal(|ui| {
-            ui.colored_label(context.theme.run(context.selection.run).color, run_label);
+            ui.colored_label(context.theme.run(context.selection.run).color, &run.spec.label);
             if context.presentation.is_figure() {
                 self.side_ui(ui);
                 return;
             }
             ui.separator();
-            self.choices_ui(ui, mask_of(context).is_some());
+            if keys.len() > 1 {
+                cameras_ui(ui, &mut context.selection.cameras, keys);
+                ui.separator();
+            }
+            self.choices_ui(ui, has_mask(context));
         });
     }
 
@@ -192,7 +238,7 @@ impl ImagePanel {
     fn image_ui(
         &mut self,
         ui: &Ui,
-        area: Rect,
+        (area, camera): (Rect, usize),
         response: &egui::Response,
         context: &mut PanelContext<'_>,
         model: &ImageModel,
@@ -206,17 +252,17 @@ impl ImagePanel {
         let painter = ui.painter_at(area);
         painter.rect_filled(area, 0.0, context.theme.plot_background);
         let size_px = image.as_ref().map(|image| [image.width, image.height]).unwrap_or_else(|| {
-            let camera_key = context.selected_run().map(|run| run.camera_key.as_str());
-            let cameras = &context.recording.rig.cameras;
-            let camera = cameras.iter().find(|camera| Some(camera.key.as_str()) == camera_key);
-            camera.map_or([640, 480], |camera| camera.model.resolution_px)
+            let of_rig = context.recording.rig.camera(&model.camera_key);
+            of_rig.map_or([640, 480], |of_rig| of_rig.model.resolution_px)
         });
         let fitted = fitted_size(area, size_px);
-        self.view.navigate(ui, context.theme, area, fitted, response, MAX_ZOOM);
-        let place = ImagePlacement { rect: self.view.place(area, fitted), size_px };
+        let view = &mut self.views[camera];
+        view.navigate(ui, context.theme, area, fitted, response, MAX_ZOOM);
+        let place = ImagePlacement { rect: view.place(area, fitted), size_px };
         if let Some(image) = image {
-            let mask = mask_of(context).filter(|_| self.options.mask);
-            let texture = self.texture(ui, image, mask);
+            let of_rig = context.recording.rig.camera(&model.camera_key).ok();
+            let mask = of_rig.and_then(|of_rig| Some(&of_rig.mask.as_ref()?.image)).filter(|_| self.options.mask);
+            let texture = cached_texture(ui, &mut self.textures[camera], image, mask);
             let uv = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
             painter.image(texture, place.rect, uv, egui::Color32::WHITE);
         } else {
@@ -227,7 +273,7 @@ impl ImagePanel {
         for mark in &model.marks {
             paint::feature(&painter, &place, mark, &self.options);
         }
-        if let Some(slide) = context.moved_chain(model.stamp_ns) {
+        if let Some(slide) = context.moved_chain(model.stamp_ns).filter(|_| camera == 0) {
             for (_, [now, moved]) in &slide.predictions_px {
                 paint::moved_prediction(&painter, &place, now, moved);
             }
@@ -279,32 +325,61 @@ impl ImagePanel {
             response.clone().on_hover_text_at_pointer(text);
         }
     }
+}
 
-    fn texture(&mut self, ui: &Ui, image: Arc<GrayImage>, mask: Option<&ImageMask>) -> egui::TextureId {
-        let masked = mask.is_some();
-        if let Some(cached) = &self.texture
-            && Arc::ptr_eq(&cached.image, &image)
-            && cached.masked == masked
-        {
-            return cached.handle.id();
+/// Draws the choice of the cameras whose images are shown.
+fn cameras_ui(ui: &mut Ui, shown: &mut ShownCameras, keys: &[&str]) {
+    let indices = shown.indices(keys);
+    let of_key = |index: usize| if index == 0 { ShownCameras::Main } else { ShownCameras::Key(keys[index].to_owned()) };
+    let mut choices = |ui: &mut Ui| {
+        for (index, key) in keys.iter().enumerate() {
+            if ui.selectable_label(indices == (index..index + 1), *key).clicked() {
+                *shown = of_key(index);
+            }
         }
-        let wanted = image.width * image.height;
-        let mut pixels = image.pixels.clone();
-        pixels.resize(wanted, 0);
-        let mut color_image = ColorImage::from_gray([image.width, image.height], &pixels);
-        if let Some(mask) = mask {
-            paint::tint(&mut color_image, mask);
+        let all = ui.selectable_label(indices.len() > 1, "All");
+        if all.on_hover_text("Images of all cameras of the run, side by side").clicked() {
+            *shown = ShownCameras::All;
         }
-        let mut cached = self.texture.take().unwrap_or_else(|| CachedTexture {
-            image: Arc::clone(&image),
-            masked,
-            handle: ui.ctx().load_texture("camera image", color_image.clone(), TextureOptions::LINEAR),
-        });
-        cached.handle.set(color_image, TextureOptions::LINEAR);
-        cached.image = image;
-        cached.masked = masked;
-        self.texture.insert(cached).handle.id()
+    };
+    if keys.len() <= CAMERA_BUTTONS {
+        choices(ui);
+    } else {
+        let selected = if indices.len() > 1 { "All" } else { keys[indices.start] };
+        egui::ComboBox::from_id_salt("cameras").selected_text(selected).show_ui(ui, choices);
     }
+}
+
+/// Texture of an image with its mask; made only where it is not the cached one.
+fn cached_texture(
+    ui: &Ui,
+    cache: &mut Option<CachedTexture>,
+    image: Arc<GrayImage>,
+    mask: Option<&ImageMask>,
+) -> egui::TextureId {
+    let masked = mask.is_some();
+    if let Some(cached) = cache
+        && Arc::ptr_eq(&cached.image, &image)
+        && cached.masked == masked
+    {
+        return cached.handle.id();
+    }
+    let wanted = image.width * image.height;
+    let mut pixels = image.pixels.clone();
+    pixels.resize(wanted, 0);
+    let mut color_image = ColorImage::from_gray([image.width, image.height], &pixels);
+    if let Some(mask) = mask {
+        paint::tint(&mut color_image, mask);
+    }
+    let mut cached = cache.take().unwrap_or_else(|| CachedTexture {
+        image: Arc::clone(&image),
+        masked,
+        handle: ui.ctx().load_texture("camera image", color_image.clone(), TextureOptions::LINEAR),
+    });
+    cached.handle.set(color_image, TextureOptions::LINEAR);
+    cached.image = image;
+    cached.masked = masked;
+    cache.insert(cached).handle.id()
 }
 
 /// Draws the parts of the caption that fit into the room.
@@ -315,11 +390,13 @@ fn caption_ui(ui: &mut Ui, context: &PanelContext<'_>, model: &ImageModel) {
     line.on_hover_text(format!("{}\n{}", model.caption(), window::CAPTION.meaning));
 }
 
-/// The mask of the camera of the selected run.
-fn mask_of<'a>(context: &PanelContext<'a>) -> Option<&'a ImageMask> {
-    let key = &context.selected_run()?.camera_key;
-    let camera = context.recording.rig.cameras.iter().find(|camera| camera.key == *key)?;
-    camera.mask.as_ref().map(|mask| &mask.image)
+/// True if a shown camera of the selected run has a mask.
+fn has_mask(context: &PanelContext<'_>) -> bool {
+    let Some(run) = context.selected_run() else { return false };
+    let keys = run.last_camera_keys();
+    let shown = context.selection.cameras.indices(&keys);
+    let is_masked = |key: &&str| context.recording.rig.camera(key).is_ok_and(|camera| camera.mask.is_some());
+    keys.get(shown).is_some_and(|shown| shown.iter().any(is_masked))
 }
 
 /// Size in points of an image that fills the area in one direction.

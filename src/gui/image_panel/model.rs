@@ -1,10 +1,11 @@
-//! Content of the image panel for one step, collected from report and tracks.
+//! Content of the image panel for one camera, collected from the report and the tracks of its last image.
 
 use nalgebra::Vector2;
 
-use crate::estimator::{ObservationReport, Phase};
-use crate::frontend::{FeatureId, FrontEndStatistics};
+use crate::estimator::{ObservationReport, Phase, StepReport};
+use crate::frontend::{FeatureId, FrontEndStatistics, TrackedFeature};
 use crate::geometry::seconds_from_ns;
+use crate::sensors::Rig;
 use crate::session::RunRecord;
 
 /// Separator between two parts of the caption.
@@ -23,7 +24,10 @@ pub enum SolveSide {
 
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct FeatureMark {
+    /// [`FeatureId::camera`] is the index of the camera that tracks it.
     pub(super) id: FeatureId,
+    /// True for a feature of the other camera of a stereo pair that is found in this image.
+    pub(super) matched: bool,
     /// Number of earlier images with an observation of this feature.
     pub(super) age: u32,
     /// Measured position in pixels.
@@ -59,11 +63,40 @@ impl SolvedMark {
     }
 }
 
+impl FeatureMark {
+    /// Mark of a feature of a camera, from the report of the step.
+    fn of(
+        report: &StepReport,
+        (feature, camera): (&TrackedFeature, usize),
+        trail_px: Vec<Vector2<f64>>,
+        matched: bool,
+    ) -> Self {
+        let id = feature.id.of_camera(camera);
+        let solved = report.features.iter().find(|solved| solved.id == id).map(|solved| {
+            let observations = if matched { &solved.matched } else { &solved.observations };
+            SolvedMark {
+                observation: observations.iter().find(|seen| seen.frame_index == report.frame_index),
+                track_weight: solved.track_weight(),
+                slides: solved.slides(),
+                depth_m: 1.0 / solved.inverse_depth_per_m,
+                observation_count: solved.observations.len() + solved.matched.len(),
+                rejected: solved.rejected,
+            }
+        });
+        Self { id, matched, age: feature.age, measured_px: feature.uv_px, trail_px, solved }
+    }
+}
+
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct ImageModel {
-    pub(super) frame_index: usize,
-    /// [`StepReport::frame_name`](crate::estimator::StepReport::frame_name).
-    pub(super) frame_name: String,
+    pub(super) camera_key: String,
+    /// True if the run has one camera.
+    pub(super) is_only_camera: bool,
+    /// Index of the image in the camera's stream.
+    pub(super) image_index: usize,
+    /// Stamp of the image on its camera's clock.
+    pub(super) image_stamp_ns: i64,
+    /// Stamp of the step.
     pub(super) stamp_ns: i64,
     pub(super) phase: Phase,
     pub(super) keyframe: bool,
@@ -81,63 +114,56 @@ pub(super) struct ImageModel {
 }
 
 impl ImageModel {
-    /// Overlay of the last step at or before the cursor; `None` before the first.
-    pub(super) fn at(run: &RunRecord, cursor_ns: i64) -> Option<Self> {
+    /// Overlay of a camera's last image at or before the cursor; `None` before the first. `camera` is its index in the
+    /// run.
+    pub(super) fn at(rig: &Rig, run: &RunRecord, camera: usize, cursor_ns: i64) -> Option<Self> {
         let after = run.steps.partition_point(|step| step.report.stamp_ns <= cursor_ns);
-        let earlier = run.steps.get(..after)?;
-        let (_, before) = earlier.split_last()?;
-        let step = run.step(before.len())?;
+        let number = (0..after).rev().find(|number| run.steps[*number].image(camera).is_some())?;
+        let step = run.step(number)?;
+        let (image_index, tracks) = step.image(camera)?;
         let report = &step.report;
-        let marks = step
-            .tracks
-            .features
-            .iter()
-            .map(|feature| {
-                let reach = TRAIL_FRAMES.min(feature.age as usize);
-                let trail_px = before
-                    .iter()
-                    .rev()
-                    .take(reach)
-                    .map_while(|step| {
-                        let features = &step.tracks.features;
-                        let at = features.binary_search_by_key(&feature.id, |earlier| earlier.id).ok()?;
-                        features.get(at).map(|earlier| earlier.uv_px)
-                    })
-                    .collect();
-                let solved = report.features.iter().find(|solved| solved.id == feature.id).map(|solved| {
-                    let mut observations = solved.observations.iter();
-                    SolvedMark {
-                        observation: observations.find(|seen| seen.frame_index == report.frame_index),
-                        track_weight: solved.track_weight(),
-                        slides: solved.slides(),
-                        depth_m: 1.0 / solved.inverse_depth_per_m,
-                        observation_count: solved.observations.len(),
-                        rejected: solved.rejected,
-                    }
-                });
-                FeatureMark { id: feature.id, age: feature.age, measured_px: feature.uv_px, trail_px, solved }
-            })
-            .collect();
+        let earlier = || run.steps[..number].iter().rev().filter_map(|step| Some(step.image(camera)?.1));
+        let own = tracks.features.iter().map(|feature| {
+            let trail = earlier().take(TRAIL_FRAMES.min(feature.age as usize)).map_while(|earlier| {
+                let at = earlier.features.binary_search_by_key(&feature.id, |earlier| earlier.id).ok()?;
+                earlier.features.get(at).map(|earlier| earlier.uv_px)
+            });
+            FeatureMark::of(report, (feature, camera), trail.collect(), false)
+        });
+        let keys = run.camera_keys(&report.calibration);
+        let other = (0..keys.len()).filter(|other| *other != camera).find_map(|other| {
+            let (_, of_other) = step.image(other).filter(|(_, of_other)| !of_other.matched.is_empty())?;
+            let partner = rig.stereo_partner(rig.camera(keys[other]).ok()?)?;
+            (partner.key == keys[camera]).then_some((other, of_other))
+        });
+        let of_other = other.into_iter().flat_map(|(other, of_other)| {
+            of_other.matched.iter().map(move |feature| FeatureMark::of(report, (feature, other), Vec::new(), true))
+        });
+        let of_camera = || report.features.iter().filter(|feature| feature.id.camera() == camera);
         Some(Self {
-            frame_index: report.frame_index,
-            frame_name: report.frame_name(),
+            camera_key: keys[camera].to_owned(),
+            is_only_camera: keys.len() == 1,
+            image_index,
+            image_stamp_ns: if camera == 0 { report.stamp_ns } else { tracks.stamp_ns },
             stamp_ns: report.stamp_ns,
             phase: report.phase,
             keyframe: report.keyframe,
-            statistics: step.tracks.statistics,
-            rejected: report.features.iter().filter(|feature| feature.rejected).count(),
-            sliding: report.features.iter().filter(|feature| feature.slides() && !feature.rejected).count(),
+            statistics: tracks.statistics,
+            rejected: of_camera().filter(|feature| feature.rejected).count(),
+            sliding: of_camera().filter(|feature| feature.slides() && !feature.rejected).count(),
             rms_before_px: report.reprojection_rms_before_px,
             rms_after_px: report.reprojection_rms_after_px,
             median_after_px: report.reprojection_median_after_px,
-            marks,
+            marks: own.chain(of_other).collect(),
         })
     }
 
     /// The parts of the caption, the most important first: `frame 120`, `6.000 s`, `reprojection RMS 0.40 px`,
     /// `tracked 98`, `keyframe`, `before the solve 0.93 px`, `median 0.12 px`, `new 12`, `lost 9`, `rejected 5`, `sliding 14`.
     fn caption_parts(&self) -> Vec<String> {
-        let mut parts = vec![format!("frame {}", self.frame_name), format!("{:.3} s", seconds_from_ns(self.stamp_ns))];
+        let camera = if self.is_only_camera { "frame" } else { &self.camera_key };
+        let mut parts =
+            vec![format!("{camera} {}", self.image_index), format!("{:.3} s", seconds_from_ns(self.image_stamp_ns))];
         let tracking = self.phase == Phase::Tracking;
         if tracking {
             parts.push(format!("reprojection RMS {:.2} px", self.rms_after_px));
@@ -183,6 +209,9 @@ pub(super) fn description(mark: &FeatureMark) -> String {
         format!("track age: {} frames", mark.age),
         format!("observation (u, v): ({:.2}, {:.2}) px", mark.measured_px.x, mark.measured_px.y),
     ];
+    if mark.matched {
+        lines.push("tracked by the other camera of the stereo pair".to_owned());
+    }
     let Some(solved) = &mark.solved else {
         lines.push("not used in the solve".to_owned());
         return lines.join("\n");

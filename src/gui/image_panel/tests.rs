@@ -2,19 +2,21 @@ use std::sync::Arc;
 
 use egui_kittest::Harness;
 use egui_kittest::kittest::{AccessKitNode, Queryable as _};
-use nalgebra::Vector2;
+use nalgebra::{Vector2, Vector3};
 
 use super::ImagePanel;
 use super::model::{ImageModel, SolveSide, description};
 use super::paint::{ImagePlacement, tint};
-use crate::estimator::FeatureReport;
+use crate::estimator::{FeatureReport, FurtherCameraEstimate};
+use crate::frontend::TrackedFrame;
+use crate::geometry::RigidTransform;
 use crate::gui::rendering::headless::{HeadlessOptions, draw};
 use crate::gui::samples::{FRAME_PERIOD_NS, first_tracked_frame, sample_images, sample_recording_of};
 use crate::gui::tests::{keep_screenshot, with_context};
 use crate::gui::theme::{Theme, ThemeName};
-use crate::gui::{ImageSource, Panel as _, Selection};
-use crate::sensors::{CameraMask, GrayImage, ImageMask};
-use crate::session::{FrameImage, Recording, StepRecord};
+use crate::gui::{CsvTable as _, ImageSource, Panel as _, Selection, ShownCameras};
+use crate::sensors::{CameraMask, CameraMount, CameraRig, ChainPrior, GrayImage, ImageMask};
+use crate::session::{FrameImage, Recording, StepImage, StepRecord};
 
 /// A recording of 80 frames with tracking in the last one.
 fn recording() -> Recording {
@@ -30,8 +32,8 @@ fn show(ui: &mut egui::Ui, panel: &mut ImagePanel, recording: &Recording, cursor
 #[test]
 fn the_caption_is_that_of_the_step_at_or_before_the_cursor() {
     let recording = recording();
-    let model = ImageModel::at(&recording.runs[0], 70 * FRAME_PERIOD_NS + 30_000_000).unwrap();
-    assert_eq!(model.frame_index, 70);
+    let model = ImageModel::at(&recording.rig, &recording.runs[0], 0, 70 * FRAME_PERIOD_NS + 30_000_000).unwrap();
+    assert_eq!(model.image_index, 70);
     let step = &recording.runs[0].steps[70];
     let statistics = step.tracks.statistics;
     let rejected = statistics.rejected + step.report.features.iter().filter(|feature| feature.rejected).count();
@@ -52,9 +54,11 @@ fn the_caption_is_that_of_the_step_at_or_before_the_cursor() {
     let short = model.fitting_caption(|text| text.chars().count() < 60);
     assert!(expected.starts_with(&short) && short.contains("RMS") && short.chars().count() < 60, "{short}");
     assert_eq!(model.fitting_caption(|_| false), "frame 70");
-    let waiting = ImageModel::at(&recording.runs[0], (first_tracked_frame() as i64 - 1) * FRAME_PERIOD_NS).unwrap();
+    let waiting =
+        ImageModel::at(&recording.rig, &recording.runs[0], 0, (first_tracked_frame() as i64 - 1) * FRAME_PERIOD_NS)
+            .unwrap();
     assert!(waiting.caption().contains(" · initializing · "), "{}", waiting.caption());
-    assert!(ImageModel::at(&recording.runs[0], -1).is_none());
+    assert!(ImageModel::at(&recording.rig, &recording.runs[0], 0, -1).is_none());
 }
 
 #[test]
@@ -65,7 +69,7 @@ fn marks_have_the_values_of_the_report() {
         step.report.features.iter().any(|feature| feature.rejected && followed(feature.id))
     };
     let step = recording.runs[0].steps.iter().rfind(is_rejected).expect("the estimator rejects outliers");
-    let model = ImageModel::at(&recording.runs[0], step.report.stamp_ns).unwrap();
+    let model = ImageModel::at(&recording.rig, &recording.runs[0], 0, step.report.stamp_ns).unwrap();
     assert_eq!(model.marks.len(), step.tracks.features.len());
     let solved = model.marks.iter().filter(|mark| mark.solved.is_some()).count();
     let followed = |id| step.tracks.features.iter().any(|track| track.id == id);
@@ -117,11 +121,98 @@ fn controls_are_found_by_label_and_work() {
     harness.get_by_label_contains("frame 79 · 3.950 s");
 }
 
+/// The recording with a second camera, a stereo pair with the first, which has an image in every second step only.
+fn with_second_camera(mut recording: Recording) -> Recording {
+    let rig = Arc::make_mut(&mut recording.rig);
+    let first = rig.cameras[0].clone();
+    let first_from_camera = RigidTransform { translation_m: Vector3::x() * 0.1, ..RigidTransform::identity() };
+    let mount = CameraMount::Static { imu_from_camera: first_from_camera };
+    rig.cameras[0].mount = CameraMount::Static { imu_from_camera: RigidTransform::identity() };
+    let relative_prior = Some(ChainPrior::RELATIVE);
+    rig.cameras.push(CameraRig { key: "cam1".to_owned(), mount, first_from_camera, relative_prior, ..first });
+    for (number, step) in recording.runs[0].steps.iter_mut().enumerate() {
+        let step = Arc::make_mut(step);
+        step.report.calibration.further_cameras.push(FurtherCameraEstimate {
+            key: "cam1".to_owned(),
+            number: 1,
+            base: Some("cam0".to_owned()),
+            base_from_camera: first_from_camera,
+        });
+        let tracks = Arc::make_mut(&mut step.tracks);
+        let further = TrackedFrame { features: tracks.features.split_off(tracks.features.len() / 2), ..tracks.clone() };
+        tracks.matched = tracks.features.iter().take(3).copied().collect();
+        let has_image = number.is_multiple_of(2);
+        step.further_images.push(StepImage {
+            index: has_image.then_some(1000 + number),
+            tracks: if has_image { Arc::new(further) } else { Arc::default() },
+        });
+    }
+    recording
+}
+
+#[test]
+fn cameras_of_a_run_are_shown_alone_or_side_by_side() {
+    let recording = with_second_camera(recording());
+    let end_ns = recording.duration_ns;
+    let steps = &recording.runs[0].steps;
+    let [last, before] = [&steps[79], &steps[78]];
+    assert_eq!((last.image(1), before.image(1).unwrap().0), (None, 1078));
+    let further = &before.further_images[0].tracks.features;
+    assert_eq!(before.feature_count(), before.tracks.features.len() + further.len());
+    let id = further[0].id.of_camera(1);
+    assert_eq!(before.track(id), Some(&further[0]));
+
+    // The last image of the camera, with its own features and those that the other camera of the pair tracks.
+    let model = ImageModel::at(&recording.rig, &recording.runs[0], 1, end_ns).unwrap();
+    assert_eq!((model.image_index, model.camera_key.as_str()), (1078, "cam1"));
+    assert!(model.caption().starts_with("cam1 1078 · "), "{}", model.caption());
+    let (matched, own): (Vec<_>, Vec<_>) = model.marks.iter().partition(|mark| mark.matched);
+    assert_eq!((own.len(), matched.len()), (further.len(), 3));
+    assert!(own.iter().all(|mark| mark.id.camera() == 1) && matched.iter().all(|mark| mark.id.camera() == 0));
+    assert!(description(matched[0]).contains("other camera of the stereo pair"));
+
+    let table = |cameras| {
+        let mut selection = Selection { cameras, ..Selection::default() };
+        let theme = Theme::of(ThemeName::Dark);
+        let mut table = String::new();
+        with_context(&recording, end_ns, &mut sample_images(), &mut selection, &theme, |context| {
+            table = ImagePanel::default().csv_table(context);
+        });
+        table
+    };
+    let rows = |table: &str, key: &str| table.lines().filter(|line| line.starts_with(&format!("{key},"))).count();
+    let all = table(ShownCameras::All);
+    assert_eq!([rows(&all, "cam0"), rows(&all, "cam1")], [last.tracks.features.len(), further.len() + 3]);
+    assert_eq!(rows(&table(ShownCameras::Main), "cam1"), 0);
+    assert_eq!(rows(&table(ShownCameras::of_name("cam1")), "cam0"), 0);
+
+    let shown = recording.clone();
+    let mut harness = Harness::builder().with_size([900.0, 700.0]).build_ui_state(
+        move |ui, (panel, selection)| show(ui, panel, &shown, end_ns, selection),
+        (ImagePanel::default(), Selection::default()),
+    );
+    harness.run();
+    let image =
+        |harness: &Harness<'_, _>, key: &str| harness.query_by_label(&format!("Image of {key} of auto")).is_some();
+    assert_eq!([image(&harness, "cam0"), image(&harness, "cam1")], [true, false]);
+    harness.get_by_label("cam1").click();
+    harness.run();
+    assert_eq!([image(&harness, "cam0"), image(&harness, "cam1")], [false, true]);
+    harness.get_by_label("All").click();
+    harness.run();
+    assert_eq!([image(&harness, "cam0"), image(&harness, "cam1")], [true, true]);
+    let rect = |key: &str| harness.get_by_label(&format!("Image of {key} of auto")).rect();
+    assert!(!rect("cam0").intersects(rect("cam1").shrink(1.0)));
+    harness.get_by_label("cam0").click();
+    harness.run();
+    assert_eq!(harness.state().1.cameras, ShownCameras::Main);
+}
+
 #[test]
 fn a_click_selects_the_feature_under_it() {
     let recording = recording();
     let end_ns = recording.duration_ns;
-    let model = ImageModel::at(&recording.runs[0], end_ns).unwrap();
+    let model = ImageModel::at(&recording.rig, &recording.runs[0], 0, end_ns).unwrap();
     let mut harness = Harness::builder().with_size([900.0, 700.0]).build_ui_state(
         move |ui, (panel, selection)| show(ui, panel, &recording, end_ns, selection),
         (ImagePanel::default(), Selection::default()),

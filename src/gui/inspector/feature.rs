@@ -12,7 +12,7 @@ use crate::session::StepRecord;
 
 pub(super) fn ui(ui: &mut Ui, ctx: &PanelContext<'_>, step: &StepRecord, id: FeatureId) {
     let theme = ctx.theme;
-    let track = step.tracks.features.iter().find(|known| known.id == id);
+    let track = step.track(id);
     let report = step.report.features.iter().find(|known| known.id == id);
     if track.is_none() && report.is_none() {
         ui.label(RichText::new("No observation in this frame").color(theme.text_weak));

@@ -24,8 +24,8 @@ pub(super) fn frame_ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, ste
     if report.restarts > 0 {
         rows.push((frame::RESTARTS, vec![report.restarts.to_string()]));
     }
-    let statistics = &step.tracks.statistics;
-    let tracks = format!("{} continued, {} new", statistics.tracked, statistics.detected);
+    let [tracked, detected] = step.tracked_and_detected();
+    let tracks = format!("{tracked} continued, {detected} new");
     rows.push((frame::TRACKS, vec![tracks]));
     rows_ui(ui, ctx.theme, "step", &rows);
     let Some(newest) = report.newest() else { return };

@@ -27,7 +27,7 @@ impl CsvTable for TimelinePanel {
             LaneColumn::new("run", |(_, run, ..)| *run),
             LaneColumn::new("phase", |(_, _, step, _)| Some((*step)?.report.phase.name())),
             LaneColumn::new("keyframe", |(_, _, step, _)| Some((*step)?.report.keyframe)),
-            LaneColumn::new("features", |(_, _, step, _)| Some((*step)?.tracks.features.len())),
+            LaneColumn::new("features", |(_, _, step, _)| Some((*step)?.feature_count())),
             LaneColumn::new("reprojection_rms_px", |(_, _, step, _)| Some(rms_px(&(*step)?.report))),
             LaneColumn::new("rank_informed", |(_, _, step, _)| rank(*step, |rank| rank.rank_informed)),
             LaneColumn::new("rank_structural", |(_, _, step, _)| rank(*step, |rank| rank.rank_structural)),

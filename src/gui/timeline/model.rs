@@ -54,7 +54,7 @@ impl RunLanes {
             self.tracking.push(report.phase == Phase::Tracking);
             let rank = step.rank.as_ref().filter(|rank| !rank.parameters.is_empty());
             let row = [
-                step.tracks.features.len() as f64,
+                step.feature_count() as f64,
                 rms_px(report),
                 rank.map_or(f64::NAN, |rank| rank.rank_informed as f64),
                 rank.map_or(f64::NAN, |rank| rank.rank_structural as f64),

@@ -59,7 +59,7 @@ pub(super) const NUMBERS: &[NumberName] = &[
     number("margin", "smallest singularity margin of the parameterization", |step| {
         step.report.calibration.margins.iter().map(|(_, margin)| *margin).reduce(f64::min)
     }),
-    number("features", "features in the image", |step| Some(step.tracks.features.len() as f64)),
+    number("features", "features in the images of all cameras", |step| Some(step.feature_count() as f64)),
     number("solved", "features used in the solve", |step| tracking(step).then_some(step.report.counts.solved as f64)),
     number("inliers", "features in the solve, not rejected", |step| {
         tracking(step).then_some(step.report.counts.inliers() as f64)

@@ -10,6 +10,7 @@ use super::step_inputs::OwnedStepInput;
 use crate::estimator::OTHER_CAMERA_FRAMES;
 use crate::geometry::seconds_from_ns;
 use crate::sensors::ImuSample;
+use crate::session::record::StepImage;
 
 /// Images of one camera of a run.
 #[derive(Debug)]
@@ -144,8 +145,8 @@ impl FrameSets {
         let gimbal_imu =
             if frame.gimbal_imu.is_empty() { Vec::new() } else { following(self.gimbal_end, &frame.gimbal_imu) };
         self.gimbal_end = gimbal_imu.last().copied();
-        let tracks = |image: &Option<Arc<OwnedStepInput>>| {
-            image.as_ref().map_or_else(Arc::default, |image| Arc::clone(image.main_tracks()))
+        let image = |image: &Option<Arc<OwnedStepInput>>| {
+            image.as_ref().map_or_else(StepImage::default, |image| image.images[0].clone())
         };
         let is_interleaved = self.frame_camera.is_some();
         OwnedStepInput {
@@ -157,7 +158,7 @@ impl FrameSets {
             image_times_s: if is_interleaved { set.image_times_s() } else { Vec::new() },
             gimbal_imu,
             joint_angles: main.unwrap_or(frame).joint_angles.clone(),
-            tracks: set.images.iter().map(tracks).collect(),
+            images: set.images.iter().map(image).collect(),
             ground_truth: frame.ground_truth,
             frontend_ms: set.images.iter().flatten().map(|image| image.frontend_ms).sum(),
         }
@@ -245,7 +246,10 @@ mod tests {
                     image_times_s: Vec::new(),
                     gimbal_imu: Vec::new(),
                     joint_angles: None,
-                    tracks: vec![Arc::new(TrackedFrame { stamp_ns: *stamp_ns, ..TrackedFrame::default() })],
+                    images: vec![StepImage {
+                        index: Some(index),
+                        tracks: Arc::new(TrackedFrame { stamp_ns: *stamp_ns, ..TrackedFrame::default() }),
+                    }],
                     ground_truth: None,
                     frontend_ms: 1.0,
                 }))
@@ -274,7 +278,7 @@ mod tests {
         let mut seen = Vec::new();
         while let Some(input) = sets.next() {
             // Tracks of a missing image have stamp 0.
-            let has = |camera: usize| input.tracks[camera].stamp_ns != 0;
+            let has = |camera: usize| input.images[camera].tracks.stamp_ns != 0;
             let imu = &input.imu;
             assert_eq!(imu[0].stamp_ns, ends_ns);
             assert!(imu.windows(2).all(|pair| pair[0].stamp_ns < pair[1].stamp_ns), "{imu:?}");
@@ -300,7 +304,7 @@ mod tests {
         while let Some(input) = sets.next() {
             assert_eq!(input.imu[0].stamp_ns, end_ns, "a gap");
             end_ns = input.imu.last().unwrap().stamp_ns;
-            let stamps_ns: Vec<i64> = input.tracks.iter().map(|tracks| tracks.stamp_ns).collect();
+            let stamps_ns: Vec<i64> = input.images.iter().map(|image| image.tracks.stamp_ns).collect();
             for (camera, stamp_ns) in stamps_ns.iter().enumerate().filter(|(_, stamp_ns)| **stamp_ns != 0) {
                 let time_s = input.image_times_s.get(camera).copied().unwrap_or(0.0);
                 assert!((seconds_from_ns(stamp_ns - end_ns) - time_s).abs() < 1e-12);

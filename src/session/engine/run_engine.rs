@@ -9,7 +9,7 @@ use crate::estimator::{Estimator, EstimatorConfig, PackedEstimator, StepInput, S
 use crate::frontend::TrackedFrame;
 use crate::gimbal::{Chain, ParameterGroup, ParameterId};
 use crate::observability::{RankReport, analyse};
-use crate::session::record::StepRecord;
+use crate::session::record::{StepImage, StepRecord};
 
 /// Jacobian columns of the extrinsics of a further camera.
 const POSE_COLUMNS: usize = 6;
@@ -135,10 +135,10 @@ impl RunEngine {
         let unread = self.settings.altered_measurements.corrections.begin_step(input.stamp_ns);
         let alterations = &self.settings.altered_measurements;
         let altered: Vec<Cow<'_, TrackedFrame>> = input
-            .tracks
+            .images
             .iter()
             .enumerate()
-            .map(|(camera, tracks)| {
+            .map(|(camera, StepImage { tracks, .. })| {
                 let altered = alterations.tracks(camera, tracks).map_or(Cow::Borrowed(&**tracks), Cow::Owned);
                 let partner = self.estimator.config().partner(camera);
                 if partner.is_some_and(|partner| alterations.is_disabled(partner)) && !altered.matched.is_empty() {

@@ -11,7 +11,7 @@ use crate::frontend::{TrackedFeature, TrackedFrame};
 use crate::geometry::RigidTransform;
 use crate::observability::RankReport;
 use crate::sensors::{ImuSample, JointAngles};
-use crate::session::record::{StepRecord, tracks_bytes};
+use crate::session::record::{StepImage, StepRecord, tracks_bytes};
 
 /// Input of one step: measurements of one camera, or of a set of images.
 ///
@@ -39,8 +39,8 @@ pub(in crate::session) struct OwnedStepInput {
     pub(in crate::session) gimbal_imu: Vec<ImuSample>,
     /// Encoder readings at the stamp of the main camera's image.
     pub(in crate::session) joint_angles: Option<JointAngles>,
-    /// Tracks by camera, the main camera first; empty where an image is missing.
-    pub(in crate::session) tracks: Vec<Arc<TrackedFrame>>,
+    /// Images by camera, the main camera first.
+    pub(in crate::session) images: Vec<StepImage>,
     /// `world_from_imu` of the ground truth.
     pub(in crate::session) ground_truth: Option<RigidTransform>,
     /// Computing time of the front ends.
@@ -54,6 +54,7 @@ impl OwnedStepInput {
             report,
             rank,
             tracks: Arc::clone(self.main_tracks()),
+            further_images: self.images[1..].to_vec(),
             ground_truth: self.ground_truth,
             log_time_ns: self.log_time_ns,
             summary_only: false,
@@ -70,14 +71,14 @@ impl OwnedStepInput {
             image_times_s: Vec::new(),
             gimbal_imu: frame.gimbal_imu,
             joint_angles: frame.joint_angles,
-            tracks: vec![Arc::new(tracks)],
+            images: vec![StepImage { index: Some(frame.index), tracks: Arc::new(tracks) }],
             ground_truth: frame.ground_truth,
             frontend_ms,
         }
     }
 
     pub(in crate::session) fn main_tracks(&self) -> &Arc<TrackedFrame> {
-        &self.tracks[0]
+        &self.images[0].tracks
     }
 
     /// Stamp of the images on the IMU's clock.
@@ -88,14 +89,15 @@ impl OwnedStepInput {
     /// Memory in bytes without the main camera's tracks, which the step's record counts. Every run that shares the
     /// input counts it.
     pub(super) fn own_bytes(&self) -> usize {
-        let rigid: usize = self.tracks.iter().skip(1).map(|tracks| tracks_bytes(tracks)).sum();
+        let further: usize = self.images.iter().skip(1).map(|image| tracks_bytes(&image.tracks)).sum();
         allocated_bytes(size_of::<Self>() + 2 * size_of::<usize>())
             + allocated_bytes(self.imu.capacity() * size_of::<ImuSample>())
             + allocated_bytes(self.imu_after.capacity() * size_of::<ImuSample>())
             + allocated_bytes(self.image_times_s.capacity() * size_of::<f64>())
             + allocated_bytes(self.gimbal_imu.capacity() * size_of::<ImuSample>())
             + self.joint_angles.as_ref().map_or(0, |angles| allocated_bytes(angles.heap_bytes()))
-            + rigid
+            + allocated_bytes(self.images.capacity() * size_of::<StepImage>())
+            + further
     }
 }
 
@@ -113,11 +115,11 @@ impl StepMeasurements for OwnedStepInput {
     }
 
     fn features(&self, camera: usize) -> &[TrackedFeature] {
-        self.tracks.get(camera).map_or(&[], |tracks| &tracks.features)
+        self.images.get(camera).map_or(&[], |image| &image.tracks.features)
     }
 
     fn matched(&self, camera: usize) -> &[TrackedFeature] {
-        self.tracks.get(camera).map_or(&[], |tracks| &tracks.matched)
+        self.images.get(camera).map_or(&[], |image| &image.tracks.matched)
     }
 }
 
@@ -193,7 +195,7 @@ mod tests {
                 image_times_s: Vec::new(),
                 gimbal_imu: Vec::new(),
                 joint_angles: None,
-                tracks: vec![Arc::default()],
+                images: vec![StepImage::default()],
                 ground_truth: None,
                 frontend_ms: 0.0,
             }));

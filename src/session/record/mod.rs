@@ -43,7 +43,7 @@ pub use solver_trace::{SolverPosition, SolverTrace};
 pub(in crate::session) use step::tracks_bytes;
 #[cfg(test)]
 pub(in crate::session) use step::warnings_of;
-pub use step::{RunWarning, StepFactorRows, StepRecord};
+pub use step::{RunWarning, StepFactorRows, StepImage, StepRecord};
 pub use step_columns::{RankColumn, StepColumn};
 pub use trajectory_accuracy::{
     RELATIVE_LENGTHS_M, RelativeAccuracy, TrajectoryAccuracy, TrajectoryEvaluation, evaluate_trajectory,

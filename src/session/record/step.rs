@@ -1,11 +1,19 @@
 use std::sync::Arc;
 
-use crate::estimator::{FactorRows, InformationGain, StepReport, StepWarning, allocated_bytes};
-use crate::frontend::{TrackedFeature, TrackedFrame};
+use crate::estimator::{FactorRows, InformationGain, OTHER_CAMERA_FRAMES, StepReport, StepWarning, allocated_bytes};
+use crate::frontend::{FeatureId, TrackedFeature, TrackedFrame};
 use crate::geometry::RigidTransform;
 use crate::observability::RankReport;
 
-/// One step of one run, with the tracks and ground truth of its image.
+/// Image of one camera in a step, with its feature tracks.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct StepImage {
+    /// Index in the camera's stream, `None` where the camera has no image in the step.
+    pub index: Option<usize>,
+    pub tracks: Arc<TrackedFrame>,
+}
+
+/// One step of one run, with the tracks and ground truth of its images.
 #[derive(Clone, Debug)]
 pub struct StepRecord {
     /// The estimator's report; its `linearization` is dropped after the analysis unless it is to be kept.
@@ -14,6 +22,8 @@ pub struct StepRecord {
     pub rank: Option<RankReport>,
     /// Feature tracks of the main camera; empty where it has no image.
     pub tracks: Arc<TrackedFrame>,
+    /// Images of the run's further cameras, in their order.
+    pub further_images: Vec<StepImage>,
     /// `world_from_imu` of the ground truth.
     pub ground_truth: Option<RigidTransform>,
     /// Log time of the image in nanoseconds since the log began; the report has its header stamp.
@@ -30,6 +40,36 @@ impl StepRecord {
         Some((self.rank.as_ref()?, self.report.gain.as_ref()?))
     }
 
+    /// Index and tracks of a camera's image in the step, `None` where it has none; 0 is the main camera.
+    pub fn image(&self, camera: usize) -> Option<(usize, &TrackedFrame)> {
+        match camera.checked_sub(1) {
+            None => (self.report.frame_index < OTHER_CAMERA_FRAMES).then_some((self.report.frame_index, &*self.tracks)),
+            Some(further) => {
+                let image = self.further_images.get(further)?;
+                Some((image.index?, &*image.tracks))
+            }
+        }
+    }
+
+    /// A feature in the images of the step; the id has its camera.
+    pub fn track(&self, id: FeatureId) -> Option<&TrackedFeature> {
+        let (_, tracks) = self.image(id.camera())?;
+        tracks.features.iter().find(|feature| feature.id.of_camera(id.camera()) == id)
+    }
+
+    /// Features of all cameras that are tracked from their previous images, and newly detected ones.
+    pub fn tracked_and_detected(&self) -> [usize; 2] {
+        let further = self.further_images.iter().map(|image| &image.tracks);
+        let statistics = std::iter::once(&self.tracks).chain(further).map(|tracks| tracks.statistics);
+        statistics.fold([0, 0], |[tracked, detected], of| [tracked + of.tracked, detected + of.detected])
+    }
+
+    /// Number of features in the images of all cameras.
+    pub fn feature_count(&self) -> usize {
+        let further = self.further_images.iter().map(|image| image.tracks.features.len());
+        self.tracks.features.len() + further.sum::<usize>()
+    }
+
     /// Memory in bytes without the tracks, which runs on the same camera share.
     pub fn own_bytes(&self) -> usize {
         let reference_counts = 2 * size_of::<usize>();
@@ -38,6 +78,7 @@ impl StepRecord {
         allocated_bytes(reference_counts + fields)
             + self.report.bytes().total()
             + self.rank.as_ref().map_or(0, RankReport::heap_bytes)
+            + allocated_bytes(self.further_images.capacity() * size_of::<StepImage>())
     }
 
     pub fn tracks_bytes(&self) -> usize {

@@ -54,6 +54,7 @@ impl StepRecord {
             },
             rank: self.rank.clone(),
             tracks: std::sync::Arc::clone(&self.tracks),
+            further_images: self.further_images.clone(),
             ground_truth: self.ground_truth,
             log_time_ns: self.log_time_ns,
             summary_only: true,

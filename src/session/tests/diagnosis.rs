@@ -90,11 +90,11 @@ fn a_wrong_focal_length_is_named_with_its_value() {
     };
     // The front end computes bearings with the camera of the rig.
     let bearings = |input: &mut OwnedStepInput, rig: &Rig| {
-        let mut tracks = (*input.tracks[0]).clone();
+        let mut tracks = (**input.main_tracks()).clone();
         for feature in &mut tracks.features {
             feature.bearing = rig.cameras[0].model.unproject(&feature.uv_px).unwrap();
         }
-        input.tracks[0] = Arc::new(tracks);
+        input.images[0].tracks = Arc::new(tracks);
     };
     let found = diagnosed(4.0, longer, bearings, &[]);
     assert_eq!((found.verdict, found.causes[0].cause), (DiagnosisVerdict::Cause, FaultKind::Focal), "{found}");

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::estimator::{ColumnGroup, Phase, StageTimes};
 use crate::session::engine::{History, OwnedStepInput, RunEngine, estimator_config};
-use crate::session::record::{RunRecord, StepRecord};
+use crate::session::record::{RunRecord, StepImage, StepRecord};
 use crate::simulation::{SyntheticFlight, SyntheticFrame, SyntheticOptions, synthetic_tracks};
 
 /// The step input of a synthetic frame.
@@ -18,7 +18,7 @@ pub(in crate::session) fn input_of(frame: &SyntheticFrame, encoder_sigma_rad: f6
         image_times_s: Vec::new(),
         gimbal_imu: frame.gimbal_imu.clone(),
         joint_angles: frame.encoder_angles(encoder_sigma_rad),
-        tracks: vec![Arc::new(frame.tracks.clone())],
+        images: vec![StepImage { index: Some(frame.index), tracks: Arc::new(frame.tracks.clone()) }],
         ground_truth: Some(frame.true_world_from_imu),
         frontend_ms: 0.0,
     }

@@ -12,7 +12,7 @@ use crate::gui::widgets::choice_ui;
 use crate::gui::window::figure::{FIGURE_FONT_PT, FIGURE_SIDE_MM, FigureFormat, FigureInput, FigureSpec};
 use crate::gui::window::panels::Panels;
 use crate::gui::window::request::WindowRequest;
-use crate::gui::{PanelContext, PanelName, ReadingCursor};
+use crate::gui::{PanelContext, PanelName, ReadingCursor, ShownCameras};
 use crate::session::Recording;
 use crate::text::Named as _;
 
@@ -45,7 +45,8 @@ impl FigureDialog {
         let last = self.spec.take().unwrap_or_else(first_spec);
         let view = panels.comparison.view.filter(|_| panel == PanelName::Comparison);
         let (run, range_ns) = (ctx.selection.run, ctx.selection.visible_ns);
-        self.spec = Some(FigureSpec { panel, view, run, range_ns, cursor_ns: None, caption: None, ..last });
+        let cameras = ctx.selection.cameras.clone();
+        self.spec = Some(FigureSpec { panel, view, run, cameras, range_ns, cursor_ns: None, caption: None, ..last });
         self.preview = None;
     }
 
@@ -96,6 +97,7 @@ fn first_spec() -> FigureSpec {
         panel: PanelName::Convergence,
         view: None,
         run: 0,
+        cameras: ShownCameras::Main,
         range_ns: None,
         cursor_ns: None,
         width_mm: COLUMNS_MM[0],

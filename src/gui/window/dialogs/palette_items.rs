@@ -134,10 +134,7 @@ fn places(typed: &str, ctx: &PanelContext<'_>) -> Vec<Item> {
     }
     let step = ctx.selected_run().and_then(|run| run.step_at(ctx.cursor_ns));
     let known = |id: FeatureId| {
-        step.is_some_and(|step| {
-            step.tracks.features.iter().any(|feature| feature.id == id)
-                || step.report.features.iter().any(|feature| feature.id == id)
-        })
+        step.is_some_and(|step| step.track(id).is_some() || step.report.features.iter().any(|feature| feature.id == id))
     };
     if is("feature") && known(FeatureId(number)) {
         items.push(item(format!("Select feature {number}"), Action::Feature(FeatureId(number))));

@@ -29,7 +29,7 @@ pub struct FigureInput<'a> {
     pub recording: &'a Recording,
     pub images: &'a mut dyn ImageSource,
     pub playback: &'a Playback,
-    /// Selection of which time range and run are replaced.
+    /// Selection of which time range, run and cameras are replaced.
     pub selection: Selection,
     /// Panels with their views.
     pub panels: Panels,
@@ -81,6 +81,7 @@ impl FigureSpec {
         let theme = Theme::of(self.theme);
         let cursor_ns = self.stamp_ns(recording);
         (selection.run, selection.visible_ns) = (self.run, self.range_ns);
+        selection.cameras = self.cameras.clone();
         let caption = self.shown_caption(recording);
         let panels = RefCell::new(panels);
         panels.borrow_mut().comparison.view = self.view;

@@ -9,7 +9,7 @@ use super::text::{FigureContent, FigureText};
 use crate::geometry::seconds_from_ns;
 use crate::gui::comparison::ComparisonView;
 use crate::gui::theme::{SMALLEST_TEXT, ThemeName};
-use crate::gui::{PanelName, Presentation};
+use crate::gui::{PanelName, Presentation, ShownCameras};
 use crate::session::Recording;
 use crate::text::{Named, command_line};
 
@@ -41,6 +41,8 @@ pub struct FigureSpec {
     pub view: Option<ComparisonView>,
     /// Index of the run in panels that show one run.
     pub run: usize,
+    /// Cameras of that run in the image panel.
+    pub cameras: ShownCameras,
     /// Time range of all plots in nanoseconds since the log began; `None` for the whole log.
     pub range_ns: Option<(i64, i64)>,
     /// Stamp of values that are not over time; `None` for the end of the range, without a line of the cursor.
@@ -136,6 +138,9 @@ impl FigureSpec {
         if self.run > 0 {
             option("shown-run", recording.runs.get(self.run).map_or_else(String::new, |run| run.spec.label.clone()));
         }
+        if let Some(cameras) = self.cameras.name().filter(|_| self.panel == PanelName::Image) {
+            option("camera", cameras.to_owned());
+        }
         if let Some((begin_ns, end_ns)) = self.range_ns {
             option("from", seconds_from_ns(begin_ns).to_string());
             option("to", seconds_from_ns(end_ns).to_string());
@@ -167,6 +172,7 @@ mod tests {
             panel: PanelName::Comparison,
             view: Some(ComparisonView::Errors),
             run: 0,
+            cameras: ShownCameras::Main,
             range_ns: Some((1_500_000_000, 4_000_000_000)),
             cursor_ns: None,
             width_mm: 85.0,
@@ -189,6 +195,10 @@ mod tests {
         let figure = FigureSpec { caption: Some("It's".to_owned()), ..figure };
         let expected = r"dcvins screenshot a.session.json --panel comparison --view errors --shown-run classical --at 2 --width-mm 85 --height-mm 60 --font-pt 8 --theme print --caption 'It'\''s' --output b.pdf";
         assert_eq!(figure.command(&recording, "a.session.json", "b.pdf"), expected);
+        let image =
+            FigureSpec { panel: PanelName::Image, view: None, cameras: ShownCameras::of_name("cam1"), ..spec() };
+        let command = image.command(&recording, "a.mcap", "b.pdf");
+        assert!(command.contains(" --panel image --camera cam1 --from 1.5 "), "{command}");
     }
 
     #[test]

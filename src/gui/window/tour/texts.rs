@@ -85,14 +85,12 @@ fn log_lines(ctx: &PanelContext<'_>, run: &RunRecord) -> Vec<String> {
 
 fn image_lines(step: &StepRecord) -> Vec<String> {
     let report = &step.report;
-    let statistics = step.tracks.statistics;
+    let [tracked, detected] = step.tracked_and_detected();
     vec![
         format!(
-            "Frame {} at {} s: {} features tracked, {} new, {} in the solve.",
+            "Frame {} at {} s: {tracked} features tracked, {detected} new, {} in the solve.",
             report.frame_name(),
             fixed(seconds_from_ns(report.stamp_ns), 2),
-            statistics.tracked,
-            statistics.detected,
             report.counts.solved
         ),
         format!(
