@@ -132,6 +132,12 @@ pub(super) fn check_topics(log: &FlightLog, rig: &Rig, findings: &mut Findings) 
     if let Some(topic) = rig.ground_truth_topic.as_ref().filter(|topic| !log.is_position_topic(topic)) {
         require("ground_truth.rostopic".into(), topic, &POSES, Severity::Note);
     }
+    for (camera, first) in rig.cameras.iter().filter_map(|camera| Some((camera, rig.first_of_topic(camera)?))) {
+        let title = format!("{} and {} have one topic", first.key, camera.key);
+        let remedy =
+            format!("name the topic of the images of {} in the rig; until then only {} is used", camera.key, first.key);
+        findings.add(Severity::Error, Area::Log, title, format!("'{}'", camera.topic), remedy);
+    }
     if named > 0 {
         findings.good(Area::Log, "the log has the topics of the rig", format!("{named} of them"));
     }

@@ -317,6 +317,12 @@ impl Rig {
         }
     }
 
+    /// First camera before another one with the same topic of images, which is a mistake in the rig.
+    pub fn first_of_topic(&self, camera: &CameraRig) -> Option<&CameraRig> {
+        let mut before = self.cameras.iter().take_while(|other| other.key != camera.key);
+        before.find(|other| other.topic == camera.topic)
+    }
+
     /// Nearest camera before another one with the same mount.
     pub fn camera_before(&self, camera: &CameraRig) -> Option<&CameraRig> {
         self.cameras_before(camera).last()

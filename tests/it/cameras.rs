@@ -43,6 +43,15 @@ fn a_cluster_of_four_cameras_starts_from_its_stereo_pair_and_gives_equal_bytes()
         assert!(started_s(run).is_some_and(|started_s| started_s < 0.5), "{run} starts at {:?}", started_s(run));
     }
     assert!(started_s("static").is_none_or(|started_s| started_s > 1.0), "one camera waits for motion");
+    // A camera that reads the topic of another one is left out, and check names it.
+    let rig = fs::read_to_string(at.join("t2.rig.yaml")).expect("the flight has a rig");
+    let wrong = rig.replace("/static_camera_right/image_raw/compressed", "/static_camera/image_raw/compressed");
+    assert_ne!(wrong, rig);
+    fs::write(at.join("wrong.rig.yaml"), wrong).expect("the folder can be written");
+    let options = ["--rig", "wrong.rig.yaml", "--run", "cluster", "-o", "wrong"];
+    let said = dcvins(at, &[&["run", "t2.mcap"], &options[..]].concat());
+    assert!(said.contains("cam1 and cam2 have one topic") && said.contains("(cam0, cam1, cam3)"), "{said}");
+    assert!(said.contains("cam2 is not used by 'cluster': it has the topic of cam1"), "{said}");
     // The calibrated rig has all cameras, and a run starts from it.
     dcvins(
         at,

@@ -21,6 +21,9 @@ use crate::sensors::{ChainPrior, ImuSample};
 /// Longest gap between IMU samples within the kept frames; a longer one drops the frames before it.
 const LONGEST_GAP_S: f64 = 0.1;
 
+/// Time without a feature of the leading camera after which another camera starts the window.
+const NO_FEATURES_S: f64 = 2.0;
+
 /// Keeps the frames of the last seconds and tries to initialize from them.
 #[derive(Clone, Debug)]
 pub(crate) struct Initializer {
@@ -145,6 +148,29 @@ impl Initializer {
         let longest_ns = (self.options(setup).longest_window_s * 1e9) as i64;
         while self.waiting.front().is_some_and(|first| input.stamp_ns - first.stamp_ns > longest_ns) {
             self.waiting.pop_front();
+        }
+        self.replace_leading_camera(events);
+    }
+
+    /// Lets another camera start the window where the leading one has had no feature for a while, preferably a rigid one.
+    fn replace_leading_camera(&mut self, events: &mut Vec<Event>) {
+        let (Some(first), Some(newest)) = (self.waiting.front(), self.waiting.back()) else { return };
+        let span_s = seconds_from_ns(newest.stamp_ns - first.stamp_ns);
+        let sees = |camera: usize, frame: &WaitingFrame| !frame.features[camera][0].is_empty();
+        let leading = self.calibration.leading();
+        if span_s < NO_FEATURES_S || self.waiting.iter().any(|frame| sees(leading, frame)) {
+            return;
+        }
+        let has_own_pose = |camera: &usize| self.calibration.of(*camera).base().is_none();
+        let seeing = (0..self.calibration.cameras()).filter(has_own_pose).filter(|camera| sees(*camera, newest));
+        let Some(other) = seeing.min_by_key(|camera| self.calibration.of(*camera).joint_count()) else { return };
+        let message = "the camera that starts the window has no features: another one starts it".to_owned();
+        events.push(Event::decided(EventKind::MeasurementMissing, message, span_s, NO_FEATURES_S));
+        self.calibration = self.calibration.clone().led_by(Some(other));
+        let joints = self.joints();
+        for frame in &mut self.waiting {
+            let joints_rad = frame.initial_joints_rad(joints);
+            frame.imu_from_camera = self.calibration.of(other).imu_from_camera(&joints_rad);
         }
     }
 

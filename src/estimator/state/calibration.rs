@@ -60,8 +60,8 @@ pub(crate) struct Calibration {
     base: Option<usize>,
     /// Other camera of a stereo pair, mounted on this one, in whose images features of this one are matched.
     partner: Option<usize>,
-    /// True if frames lie at the images of this camera and images of other cameras between them.
-    has_frames: bool,
+    /// True if this camera starts the window in place of the first rigid one.
+    leads: bool,
     /// Columns after the chain's, as parameters of the main camera.
     sensors: Arc<[SensorColumn]>,
     /// Readout time of the rig, in seconds.
@@ -92,7 +92,7 @@ impl Calibration {
             number: 0,
             base: None,
             partner: None,
-            has_frames: false,
+            leads: false,
             sensors: Arc::default(),
             given_readout_s: 0.0,
             given_gimbal_imu: None,
@@ -129,13 +129,13 @@ impl Calibration {
         self.partner
     }
 
-    /// This calibration as the one of the camera at whose images frames lie, or of another one.
-    pub(crate) fn with_frames(self, has_frames: bool) -> Self {
-        Self { has_frames, ..self }
+    /// Chooses this camera to start the window, or no longer.
+    pub(crate) fn set_leads(&mut self, leads: bool) {
+        self.leads = leads;
     }
 
-    pub(crate) fn has_frames(&self) -> bool {
-        self.has_frames
+    pub(crate) fn leads(&self) -> bool {
+        self.leads
     }
 
     /// Adds columns for time offsets, shutter and intrinsics, unless the calibration is fixed.

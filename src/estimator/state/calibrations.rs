@@ -27,11 +27,12 @@ impl Calibrations {
         Self { cameras: std::iter::once(main).chain(rigid).collect(), imu: None }
     }
 
-    /// These calibrations with the frames at the images of one camera; `None` if all images of a frame have one stamp.
-    pub(crate) fn with_frame_camera(self, frame_camera: Option<usize>) -> Self {
-        let cameras = self.cameras.into_iter().enumerate();
-        let cameras = cameras.map(|(index, one)| one.with_frames(frame_camera == Some(index)));
-        Self { cameras: cameras.collect(), ..self }
+    /// These calibrations with the camera that starts the window; `None` for the first rigid one.
+    pub(crate) fn led_by(mut self, leading: Option<usize>) -> Self {
+        for (index, camera) in self.cameras.iter_mut().enumerate() {
+            camera.set_leads(leading == Some(index));
+        }
+        self
     }
 
     pub(crate) fn with_imu(self, imu: Option<ImuCalibration>) -> Self {
@@ -123,12 +124,12 @@ impl Calibrations {
         &mut self.cameras[camera]
     }
 
-    /// Camera that starts the window: the one at whose images frames lie, else a rigid one if there is one, since its
-    /// extrinsics are most accurate.
+    /// Camera that starts the window: the chosen one, else a rigid one if there is one, since its extrinsics are most
+    /// accurate.
     pub(crate) fn leading(&self) -> usize {
         let is_rigid = |calibration: &Calibration| calibration.base().is_none() && calibration.joint_count() == 0;
         let rigid = || self.cameras.iter().position(is_rigid);
-        self.cameras.iter().position(Calibration::has_frames).or_else(rigid).unwrap_or(MAIN)
+        self.cameras.iter().position(Calibration::leads).or_else(rigid).unwrap_or(MAIN)
     }
 
     /// True if the leading camera's chain has [inaccurate rotations](Calibration::has_inaccurate_rotations).

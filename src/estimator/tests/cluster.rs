@@ -167,6 +167,20 @@ fn interleaved_cameras_are_nearly_as_accurate_as_synchronized_ones() {
 }
 
 #[test]
+fn the_gimballed_camera_starts_the_window_where_the_rigid_one_has_no_features() {
+    let flights = BothFlights::new(1, 9.0);
+    let (estimator, reports) = flights.run_flight(flights.config(), |_| [true, false]);
+    let replaced =
+        |report: &&StepReport| report.events.iter().any(|event| event.message.contains("another one starts"));
+    assert_eq!(reports.iter().filter(replaced).count(), 1);
+    assert_eq!((reports.last().unwrap().phase, estimator.restarts), (Phase::Tracking, 0));
+    let alone = EstimatorConfig { further_cameras: Vec::new(), ..flights.config() };
+    let (_, alone) = run_flight(&flights.gimbal.frames, alone);
+    let [error_m, alone_m] = [&reports, &alone].map(|reports| trajectory_error_m(&flights.gimbal.frames, reports).0);
+    assert!(error_m < 1.5 * alone_m, "{error_m} m, {alone_m} m with one camera");
+}
+
+#[test]
 fn both_calibrations_have_named_columns() {
     let flights = BothFlights::new(5, 10.0);
     let options = EstimatorOptions { keep_linearization: true, ..EstimatorOptions::default() };

@@ -83,7 +83,7 @@ impl Setup {
         let estimated = config.calibrate && config.estimate_imu_intrinsics;
         Calibrations::new(main, rigid)
             .with_imu(estimated.then(|| ImuCalibration::new(config.imu_intrinsics)))
-            .with_frame_camera(config.frame_camera)
+            .led_by(config.frame_camera)
     }
 
     /// Prior of the biases from an earlier pass.

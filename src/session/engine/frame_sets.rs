@@ -56,6 +56,9 @@ pub(super) struct FrameSets {
     end: Option<ImuSample>,
     /// The same of the IMU on the gimbal; `None` where its samples are missing.
     gimbal_end: Option<ImuSample>,
+    /// IMU samples after the previous set's frame, until its last image; needed where the next frame lies at the image of
+    /// another camera.
+    after_frame: Vec<ImuSample>,
     /// Offset of the IMU's clock from the main camera's, from its last image.
     main_shift_ns: Option<i64>,
 }
@@ -67,7 +70,7 @@ impl FrameSets {
         frame_camera: Option<FrameCamera>,
     ) -> Self {
         let cameras = inputs.into_iter().map(CameraInputs::new).collect();
-        Self { cameras, frame_camera, end: None, gimbal_end: None, main_shift_ns: None }
+        Self { cameras, frame_camera, end: None, gimbal_end: None, after_frame: Vec::new(), main_shift_ns: None }
     }
 
     /// The next set; blocks until it is available. `None` at the end of all streams.
@@ -128,6 +131,9 @@ impl FrameSets {
             let count = waiting.partition_point(|input| input.imu_stamp_ns() < until_ns);
             images[camera] = waiting.drain(..count).min_by_key(|input| (input.imu_stamp_ns() - at_ns).abs());
         }
+        // Without a feature in its image, as behind a lens cap, the frame lies at the image of another camera.
+        let sees = |camera: &usize| images[*camera].as_ref().is_some_and(|image| image.has_features());
+        let frame = std::iter::once(frame).chain(0..images.len()).find(sees).unwrap_or(frame);
         Some(FrameSet { images, frame })
     }
 
@@ -140,7 +146,13 @@ impl FrameSets {
         }
         // An input has the samples since the previous image of its own camera, but another camera may have had an image
         // since then.
-        let imu = following(self.end, &frame.imu);
+        let imu = match self.after_frame.as_slice() {
+            later if frame.imu.first().zip(self.end).is_some_and(|(first, end)| first.stamp_ns > end.stamp_ns) => {
+                following(self.end, &merged([later, &frame.imu]))
+            }
+            _ => following(self.end, &frame.imu),
+        };
+        self.after_frame = if self.frame_camera.is_some() { set.imu_after() } else { Vec::new() };
         self.end = imu.last().copied().or(self.end);
         let gimbal_imu =
             if frame.gimbal_imu.is_empty() { Vec::new() } else { following(self.gimbal_end, &frame.gimbal_imu) };
@@ -193,13 +205,18 @@ impl FrameSet {
     fn imu_after(&self) -> Vec<ImuSample> {
         let frame = self.frame_image();
         let Some(at) = frame.imu.last() else { return Vec::new() };
-        let of_images = self.images.iter().flatten().flat_map(|image| image.imu.iter().chain(&image.imu_after));
-        let mut samples: Vec<ImuSample> = of_images.filter(|sample| sample.stamp_ns > at.stamp_ns).copied().collect();
-        samples.sort_by_key(|sample| sample.stamp_ns);
-        samples.dedup_by_key(|sample| sample.stamp_ns);
-        samples.insert(0, *at);
-        samples
+        let of_images = self.images.iter().flatten().flat_map(|image| [image.imu.as_slice(), &image.imu_after]);
+        let samples = merged(of_images).into_iter().filter(|sample| sample.stamp_ns > at.stamp_ns);
+        std::iter::once(*at).chain(samples).collect()
     }
+}
+
+/// Samples in time order, each stamp once.
+fn merged<'a>(samples: impl IntoIterator<Item = &'a [ImuSample]>) -> Vec<ImuSample> {
+    let mut samples: Vec<ImuSample> = samples.into_iter().flatten().copied().collect();
+    samples.sort_by_key(|sample| sample.stamp_ns);
+    samples.dedup_by_key(|sample| sample.stamp_ns);
+    samples
 }
 
 /// Samples after the end of the previous set, which comes first; all samples without one.
@@ -216,15 +233,27 @@ fn following(end: Option<ImuSample>, samples: &[ImuSample]) -> Vec<ImuSample> {
 mod tests {
     use std::sync::mpsc::sync_channel;
 
-    use nalgebra::Vector3;
+    use nalgebra::{Vector2, Vector3};
 
     use super::*;
-    use crate::frontend::TrackedFrame;
+    use crate::frontend::{FeatureId, TrackedFeature, TrackedFrame};
 
     const PERIOD_NS: i64 = 50_000_000;
 
     /// Images at these stamps, each with the IMU samples since the previous one at 200 Hz.
     fn images(stamps_ns: &[i64]) -> Receiver<Arc<OwnedStepInput>> {
+        images_with_features(stamps_ns, false)
+    }
+
+    fn images_with_features(stamps_ns: &[i64], sees: bool) -> Receiver<Arc<OwnedStepInput>> {
+        let feature = TrackedFeature {
+            id: FeatureId(1),
+            age: 0,
+            uv_px: Vector2::zeros(),
+            previous_uv_px: None,
+            bearing: Vector3::z(),
+        };
+        let features = if sees { vec![feature] } else { Vec::new() };
         let (sender, receiver) = sync_channel(stamps_ns.len());
         let mut before_ns = 0;
         for (index, stamp_ns) in stamps_ns.iter().enumerate() {
@@ -248,7 +277,11 @@ mod tests {
                     joint_angles: None,
                     images: vec![StepImage {
                         index: Some(index),
-                        tracks: Arc::new(TrackedFrame { stamp_ns: *stamp_ns, ..TrackedFrame::default() }),
+                        tracks: Arc::new(TrackedFrame {
+                            stamp_ns: *stamp_ns,
+                            features: features.clone(),
+                            ..TrackedFrame::default()
+                        }),
                     }],
                     ground_truth: None,
                     frontend_ms: 1.0,
@@ -296,13 +329,16 @@ mod tests {
 
     /// Stamps of the images of each set of interleaved cameras in milliseconds, `None` where one is missing.
     fn interleaved_ms(main_ns: &[i64], rigid_ns: &[i64], frame_camera: usize) -> Vec<[Option<i64>; 2]> {
-        let mut sets = FrameSets::new(
-            [images(main_ns), images(rigid_ns)],
-            Some(FrameCamera { camera: frame_camera, reach_ns: 30_000_000 }),
-        );
+        sets_ms([images(main_ns), images(rigid_ns)], frame_camera)
+    }
+
+    fn sets_ms(inputs: [Receiver<Arc<OwnedStepInput>>; 2], frame_camera: usize) -> Vec<[Option<i64>; 2]> {
+        let mut sets = FrameSets::new(inputs, Some(FrameCamera { camera: frame_camera, reach_ns: 30_000_000 }));
         let (mut end_ns, mut seen) = (0, Vec::new());
         while let Some(input) = sets.next() {
             assert_eq!(input.imu[0].stamp_ns, end_ns, "a gap");
+            let gap = input.imu.windows(2).find(|pair| pair[1].stamp_ns - pair[0].stamp_ns > 5_000_000);
+            assert!(gap.is_none(), "a gap: {gap:?}");
             end_ns = input.imu.last().unwrap().stamp_ns;
             let stamps_ns: Vec<i64> = input.images.iter().map(|image| image.tracks.stamp_ns).collect();
             for (camera, stamp_ns) in stamps_ns.iter().enumerate().filter(|(_, stamp_ns)| **stamp_ns != 0) {
@@ -341,6 +377,16 @@ mod tests {
             (seen.iter().filter(|[_, rigid]| rigid.is_none()), seen.iter().filter(|[main, _]| main.is_none()));
         assert_eq!((alone.count(), missing.count()), (8, 0), "{seen:?}");
         assert!(seen.windows(2).all(|pair| pair[0].iter().max() < pair[1].iter().max()), "{seen:?}");
+    }
+
+    #[test]
+    fn frames_lie_at_the_images_of_another_camera_where_those_of_the_frame_camera_have_no_features() {
+        let inputs = [images_with_features(&periods(8, 20_000_000), true), images(&periods(8, 0))];
+        let mut sets = FrameSets::new(inputs, Some(FrameCamera { camera: 1, reach_ns: 30_000_000 }));
+        let stamps_ns: Vec<i64> = std::iter::from_fn(|| sets.next()).map(|input| input.imu_stamp_ns()).collect();
+        assert_eq!(stamps_ns, periods(8, 20_000_000));
+        let inputs = [images_with_features(&periods(8, 20_000_000), true), images(&periods(8, 0))];
+        assert!(sets_ms(inputs, 1).iter().all(|[main, rigid]| main.unwrap() - rigid.unwrap() == 20));
     }
 
     #[test]

@@ -81,6 +81,11 @@ impl OwnedStepInput {
         &self.images[0].tracks
     }
 
+    /// True if its main camera has features in its image.
+    pub(super) fn has_features(&self) -> bool {
+        !self.main_tracks().features.is_empty()
+    }
+
     /// Stamp of the images on the IMU's clock.
     pub(super) fn imu_stamp_ns(&self) -> i64 {
         self.imu.last().map_or(self.stamp_ns, |last| last.stamp_ns)

@@ -13,7 +13,9 @@ use super::trajectories::{self, LoadedPositions, LoadedTrajectory, LoadedTruth};
 use super::trajectory_spec::{TrajectorySource, TrajectorySpec};
 use crate::estimator::pose_columns;
 use crate::files::LogLimits;
-use crate::flight_log::{FlightLog, MessageKind, is_batch_reference};
+use crate::flight_log::{
+    FlightLog, LogWarning, MessageKind, WarningKind, image_stamps, imu_samples, is_batch_reference,
+};
 use crate::geometry::{RigidTransform, seconds_from_ns};
 use crate::gimbal::{Chain, ParameterId, Parameterization};
 use crate::sensors::{CameraRig, LeverArm, PoseTrack, Rig};
@@ -68,6 +70,8 @@ pub struct SessionPlan {
     pub prior: Option<Arc<FlightPrior>>,
     /// The runs, each with the key of its main camera.
     pub runs: Vec<(RunSpec, String)>,
+    /// Cameras that runs of all cameras cannot use.
+    pub warnings: Vec<LogWarning>,
     /// Trajectories of other programs, shown with the runs.
     pub trajectories: Vec<LoadedTrajectory>,
     /// Requested ground truth of the trajectory, and requested lever arm.
@@ -113,9 +117,7 @@ impl SessionPlan {
             return Err(SessionError::TooManyRuns { count: specs.len() });
         }
         distinct_labels(&mut specs);
-        for spec in &mut specs {
-            name_recorded_cameras(&log, &rig, spec);
-        }
+        let warnings = specs.iter_mut().flat_map(|spec| name_usable_cameras(&log, &rig, spec)).collect();
         let runs = specs
             .into_iter()
             .map(|spec| cameras_of_run(&rig, &spec).map(|cameras| (spec, cameras.main.key.clone())))
@@ -152,6 +154,7 @@ impl SessionPlan {
             ground_truth_rig: ground_truth_rig.map(Arc::new),
             prior: request.prior.clone(),
             runs,
+            warnings,
             start_s: request.start_s,
             duration_s: request.duration_s,
             keep_linearization_every: None,
@@ -235,18 +238,43 @@ pub(in crate::session) fn cameras_of_run<'rig>(
     Ok(RunCameras { main: main.ok_or_else(|| refused(wanted))?, others: Vec::new() })
 }
 
-/// Names the cameras of a cluster of all cameras that the log has, if it lacks the images of others.
-fn name_recorded_cameras(log: &FlightLog, rig: &Rig, spec: &mut RunSpec) {
+/// Names the cameras of a cluster of all cameras, if it cannot use others; returns a warning for each of those.
+fn name_usable_cameras(log: &Arc<FlightLog>, rig: &Rig, spec: &mut RunSpec) -> Vec<LogWarning> {
     if spec.parameterization != ParameterizationChoice::Cluster || !spec.cluster_keys.is_empty() {
-        return;
+        return Vec::new();
     }
-    let is_recorded = |camera: &&CameraRig| {
-        log.require_topic(&format!("{}.rostopic", camera.key), &camera.topic, &MessageKind::IMAGES).is_ok()
-    };
-    let recorded: Vec<&CameraRig> = rig.cameras.iter().filter(is_recorded).collect();
-    if recorded.len() > 1 && recorded.len() < rig.cameras.len() {
-        spec.cluster_keys = recorded.into_iter().map(|camera| camera.key.clone()).collect();
+    let imu_ns = imu_samples(log, rig).ok().and_then(|mut samples| samples.next()).map(|sample| sample.stamp_ns);
+    let (mut usable, mut warnings) = (Vec::new(), Vec::new());
+    for camera in &rig.cameras {
+        match reason_against(log, rig, camera, imu_ns) {
+            None => usable.push(camera.key.clone()),
+            Some(reason) => {
+                let message = format!("{} is not used by '{}': {reason}", camera.key, spec.label);
+                warnings.push(LogWarning::new(WarningKind::Topics, &camera.topic, 0, message));
+            }
+        }
     }
+    if usable.len() < 2 || warnings.is_empty() {
+        return Vec::new();
+    }
+    spec.cluster_keys = usable;
+    warnings
+}
+
+/// Reason why a cluster cannot use a camera, `None` if it can; `imu_ns` is the stamp of the first IMU sample.
+fn reason_against(log: &Arc<FlightLog>, rig: &Rig, camera: &CameraRig, imu_ns: Option<i64>) -> Option<String> {
+    if log.require_topic(&format!("{}.rostopic", camera.key), &camera.topic, &MessageKind::IMAGES).is_err() {
+        return Some("the log has no images of its topic".to_owned());
+    }
+    if let Some(first) = rig.first_of_topic(camera) {
+        return Some(format!("it has the topic of {}", first.key));
+    }
+    let image_ns = image_stamps(log, camera, 0).ok().and_then(|mut stamps| stamps.next())?;
+    let apart_ns = (image_ns - imu_ns?).abs();
+    (apart_ns > log.duration_ns()).then(|| {
+        let apart_s = seconds_from_ns(apart_ns);
+        format!("its first image is {apart_s:.1} s from the first IMU sample; check {}.timeshift_cam_imu", camera.key)
+    })
 }
 
 /// Cameras of a cluster: those that it names, else all; the one on the gimbal is the main one.

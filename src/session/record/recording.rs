@@ -112,6 +112,7 @@ impl Recording {
         let replaced =
             |warning: &&LogWarning| warning.kind == WarningKind::Stamps && plan.rig.uses_log_time(&warning.subject);
         recording.add_warnings(plan.log.warnings().iter().filter(|warning| !replaced(warning)).cloned().collect());
+        recording.add_warnings(plan.warnings.clone());
         recording
     }
 
