@@ -266,7 +266,7 @@ pub(super) fn app() -> (Harness<'static, App>, Arc<TestDesktop>) {
 /// Runs frames until the condition is true; logs are opened on another thread.
 #[track_caller]
 pub(super) fn run_until(harness: &mut Harness<'static, App>, holds: impl Fn(&Harness<'static, App>) -> bool) {
-    for _ in 0..2000 {
+    for _ in 0..10_000 {
         harness.run_steps(1);
         if holds(harness) {
             return;
@@ -402,6 +402,11 @@ fn the_open_dialog_completes_paths() {
     harness.key_press(Key::Enter);
     run_until(&mut harness, |harness| opened(harness) == Some(PathBuf::from("/logs/city.mcap")));
     assert!(harness.query_by_label("/logs/city.mcap").is_none(), "the dialog closes");
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::O);
+    harness.run_steps(3);
+    harness.event(egui::Event::Text("/x/b.mcap".to_owned()));
+    harness.run_steps(3);
+    assert!(harness.query_all_by_value("/x/b.mcap").next().is_some(), "typing replaces the path of the last time");
 }
 
 #[test]

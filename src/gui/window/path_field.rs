@@ -77,6 +77,8 @@ impl PathField {
             edit.widget_info(|| egui::WidgetInfo::labeled(egui::Role::TextInput, true, "Path of the log"));
             if focus && !edit.has_focus() {
                 edit.request_focus();
+                // Typing replaces the path of the last time.
+                select(ui, id, [0, self.typed.chars().count()]);
             }
             let ready = !self.typed.trim().is_empty();
             if ui.add_enabled(ready, egui::Button::new("Open")).clicked() {
@@ -103,16 +105,18 @@ impl PathField {
         });
         if let Some(path) = filled {
             self.typed = path;
-            move_caret_to_end(ui, id, self.typed.chars().count());
+            let end = self.typed.chars().count();
+            select(ui, id, [end, end]);
         }
         opened.map(PathBuf::from)
     }
 }
 
-fn move_caret_to_end(ui: &Ui, id: Id, end: usize) {
+/// Selects a range of letters; an empty one moves the caret.
+fn select(ui: &Ui, id: Id, range: [usize; 2]) {
     if let Some(mut state) = TextEdit::load_state(ui.ctx(), id) {
-        let caret = egui::text::CCursor::new(end);
-        state.cursor.set_char_range(Some(egui::text::CCursorRange::one(caret)));
+        let [from, to] = range.map(egui::text::CCursor::new);
+        state.cursor.set_char_range(Some(egui::text::CCursorRange::two(from, to)));
         state.store(ui.ctx(), id);
     }
 }

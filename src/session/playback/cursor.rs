@@ -154,31 +154,34 @@ impl Cursor {
 
     /// Moves by frames of all runs; equal stamps count once.
     fn step_frames(&self, recording: &Recording, count: i64) -> Self {
-        self.step_over(&stamps_ns(recording, |_| true), count)
+        self.step_over(recording, &stamps_ns(recording, |_| true), count)
     }
 
     fn jump_to_event(&self, recording: &Recording, forward: bool) -> Self {
         let notable = |step: &StepRecord| step.report.events.iter().any(|event| event.kind.is_notable());
-        self.step_over(&stamps_ns(recording, notable), if forward { 1 } else { -1 })
+        self.step_over(recording, &stamps_ns(recording, notable), if forward { 1 } else { -1 })
     }
 
     fn jump_to_keyframe(&self, recording: &Recording, run: usize, forward: bool) -> Self {
         let steps = recording.runs.get(run).into_iter().flat_map(|run| &run.steps);
         let keyframes = steps.filter(|step| step.report.keyframe);
         let stamps_ns: Vec<i64> = keyframes.map(|step| step.report.stamp_ns).collect();
-        self.step_over(&stamps_ns, if forward { 1 } else { -1 })
+        self.step_over(recording, &stamps_ns, if forward { 1 } else { -1 })
     }
 
-    /// Moves to the `count`-th stamp after the cursor (before it if negative), or to the last one in that direction;
-    /// does not move if there is none.
-    fn step_over(&self, stamps_ns: &[i64], count: i64) -> Self {
+    /// Moves to the `count`-th stamp after the cursor, or before the shown frame if negative, or to the last one in that
+    /// direction; does not move if there is none.
+    fn step_over(&self, recording: &Recording, stamps_ns: &[i64], count: i64) -> Self {
         let places = usize::try_from(count.unsigned_abs()).unwrap_or(usize::MAX);
         let target = if count >= 0 {
             let after = stamps_ns.partition_point(|stamp| *stamp <= self.stamp_ns);
             let target = after.saturating_add(places).saturating_sub(1).min(stamps_ns.len().saturating_sub(1));
             stamps_ns.get(target).copied().filter(|stamp| *stamp > self.stamp_ns)
         } else {
-            let before = stamps_ns.partition_point(|stamp| *stamp < self.stamp_ns);
+            // Between two frames the earlier one is shown already.
+            let shown = recording.runs.iter().filter_map(|run| run.step_at(self.stamp_ns));
+            let shown_ns = shown.map(|step| step.report.stamp_ns).max().unwrap_or(self.stamp_ns);
+            let before = stamps_ns.partition_point(|stamp| *stamp < shown_ns);
             stamps_ns.get(before.saturating_sub(places)).copied().filter(|stamp| *stamp < self.stamp_ns)
         };
         Self { stamp_ns: target.unwrap_or(self.stamp_ns), ..*self }
@@ -309,6 +312,11 @@ mod tests {
         assert_eq!(after(at_start, &Command::Seek { stamp_ns: i64::MAX }).stamp_ns, last);
         let playing = after(at_start, &Command::Play);
         assert!(playing.playing && !after(playing, &Command::StepFrames(1)).playing);
+        // Between two frames the earlier one is shown, so that a step back leads to the one before it.
+        let between = Cursor::new(stamps[3] + 1);
+        assert_eq!(after(between, &Command::StepFrames(-1)).stamp_ns, stamps[2]);
+        assert_eq!(after(between, &Command::StepFrames(1)).stamp_ns, stamps[4]);
+        assert_eq!(after(Cursor::new(first + 1), &Command::StepFrames(-1)).stamp_ns, first);
         // Other commands are handled by the session.
         assert_eq!(at_start.apply(&Command::ToggleMarker, sample(), &Breakpoints::default()), None);
     }

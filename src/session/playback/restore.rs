@@ -1,30 +1,30 @@
 //! Saving and restoring sessions.
 
+use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::markers::Markers;
 use super::saved::{
-    PendingRestore, SavedBreakpoint, SavedFork, SavedLog, SavedPrior, SavedSession, SavedSessionError, VERSION,
-    entry_error,
+    PendingRestore, PendingRun, SavedBreakpoint, SavedFork, SavedLog, SavedPrior, SavedSession, SavedSessionError,
+    VERSION, entry_error,
 };
 use super::session::Session;
 use crate::sensors::RequiredAccuracy;
 use crate::session::breakpoints::Condition;
-use crate::session::plan::{FlightPrior, ForkChanges, SessionPlan, SessionRequest, TrajectorySource, TrajectorySpec};
+use crate::session::plan::{
+    FlightPrior, ForkChanges, RunSpec, SessionPlan, SessionRequest, TrajectorySource, TrajectorySpec,
+};
 
 impl SavedSession {
     /// Opens the log and starts the runs; `prior` is the calibration at [`Self::prior`]. Forks are started when their
     /// parents reach the fork's first step, and the cursor is set to its position when all runs have reached it.
     pub fn open(&self, prior: Option<Arc<FlightPrior>>) -> Result<Session, SavedSessionError> {
-        let plan = SessionPlan::open(&SessionRequest { prior, ..self.request()? })?;
+        let request = self.request()?;
+        let (specs, pending) = self.in_order(request.specs.clone())?;
+        let plan = SessionPlan::open(&SessionRequest { specs, prior, ..request })?;
         let conditions: Result<Vec<Condition>, _> = self.breakpoints.iter().map(|it| it.condition.parse()).collect();
         let conditions = conditions.map_err(entry_error)?;
-        let mut forks = Vec::new();
-        for fork in &self.forks {
-            let changes: ForkChanges = fork.changes.parse().map_err(entry_error)?;
-            forks.push((fork.clone(), changes));
-        }
         let same = (plan.log.size_bytes(), plan.log.checksum()) == (self.log.bytes, self.log.crc32);
         let mut session = Session::start(plan)?;
         if !same {
@@ -38,9 +38,27 @@ impl SavedSession {
             }
         });
         session.markers = Markers::new(self.markers.clone());
-        session.pending = PendingRestore { forks, cursor_ns: Some(self.cursor_ns) };
+        session.pending = PendingRestore { runs: pending, cursor_ns: Some(self.cursor_ns) };
         session.layout.clone_from(&self.layout);
         Ok(session)
+    }
+
+    /// Specifications of the runs before the first fork, then the first fork and all that follow it.
+    fn in_order(&self, specs: Vec<RunSpec>) -> Result<(Vec<RunSpec>, VecDeque<PendingRun>), SavedSessionError> {
+        let mut all: Vec<PendingRun> = specs.into_iter().map(PendingRun::Run).collect();
+        for fork in &self.forks {
+            let changes: ForkChanges = fork.changes.parse().map_err(entry_error)?;
+            all.push(PendingRun::Fork(fork.clone(), changes));
+        }
+        let place = |run: &PendingRun| self.order.iter().position(|label| label == run.label());
+        all.sort_by_key(|run| place(run).unwrap_or(usize::MAX));
+        let first_fork = all.iter().position(|run| matches!(run, PendingRun::Fork(..))).unwrap_or(all.len());
+        let pending = all.split_off(first_fork).into();
+        let started = all.into_iter().filter_map(|run| match run {
+            PendingRun::Run(spec) => Some(spec),
+            PendingRun::Fork(..) => None,
+        });
+        Ok((started.collect(), pending))
     }
 }
 
@@ -60,7 +78,16 @@ impl Session {
                 changes: origin.changes.to_string(),
             })
         });
-        let pending = self.pending.forks.iter().map(|(fork, _)| fork.clone());
+        let started = recording.runs.iter().filter(|run| run.origin.is_none()).map(|run| run.spec.to_string());
+        let (mut runs, mut forks): (Vec<String>, Vec<SavedFork>) = (started.collect(), forks.collect());
+        for pending in &self.pending.runs {
+            match pending {
+                PendingRun::Run(spec) => runs.push(spec.to_string()),
+                PendingRun::Fork(fork, _) => forks.push(fork.clone()),
+            }
+        }
+        let labels = recording.runs.iter().map(|run| run.spec.label.as_str());
+        let order = labels.chain(self.pending.runs.iter().map(PendingRun::label)).map(str::to_owned);
         let breakpoints = self.breakpoints.list().iter().map(|breakpoint| SavedBreakpoint {
             condition: breakpoint.condition.text().to_owned(),
             enabled: breakpoint.enabled,
@@ -77,14 +104,15 @@ impl Session {
                 .then(|| required.to_text(&recording.rig.parameter_names())),
             start_s: self.plan.start_s,
             duration_s: self.plan.duration_s,
-            runs: recording.runs.iter().filter(|run| run.origin.is_none()).map(|run| run.spec.to_string()).collect(),
+            runs,
             prior: self
                 .plan
                 .prior
                 .as_ref()
                 .map(|prior| SavedPrior { folder: absolute(&prior.folder), growth: prior.growth }),
             trajectories: self.plan.trajectories.iter().map(|loaded| saved_spec(&loaded.spec)).collect(),
-            forks: forks.chain(pending).collect(),
+            forks,
+            order: order.collect(),
             breakpoints: breakpoints.collect(),
             markers: self.markers().to_vec(),
             cursor_ns: self.pending.cursor_ns.unwrap_or(self.cursor.stamp_ns),
@@ -96,7 +124,7 @@ impl Session {
     pub fn finish(&mut self) {
         const CHECK_MS: u64 = 5;
         let open = |session: &Self| {
-            let pending = !session.pending.forks.is_empty() || session.pending.cursor_ns.is_some();
+            let pending = !session.pending.runs.is_empty() || session.pending.cursor_ns.is_some();
             pending || session.recording().runs.iter().any(|run| !run.finished)
         };
         while open(self) {
@@ -115,33 +143,50 @@ impl Session {
         self.layout.as_ref()
     }
 
-    /// Starts the forks whose parents have reached their first step, and sets the cursor to its saved position.
+    /// Starts the pending runs up to the first fork whose parent has not reached its first step, and sets the cursor to its
+    /// saved position.
     pub(in crate::session) fn resume(&mut self) {
-        let recording = self.recording();
-        if let Some((fork, changes)) = self.pending.forks.first().cloned() {
-            let parent = recording.runs.iter().position(|run| run.spec.label == fork.parent);
-            let run = parent.and_then(|parent| recording.runs.get(parent));
-            let reached =
-                run.and_then(|run| run.steps.last()).is_some_and(|last| last.report.stamp_ns >= fork.stamp_ns);
-            if let (Some(parent), true) = (parent, reached) {
-                self.pending.forks.remove(0);
-                if let Err(problem) = self.fork_at(parent, fork.stamp_ns, &changes, Some(fork.name)) {
-                    self.notices.push(problem);
+        while let Some(pending) = self.pending.runs.pop_front() {
+            match pending {
+                PendingRun::Run(spec) => self.add_run(spec),
+                PendingRun::Fork(fork, changes) => {
+                    if let Some(waiting) = self.restore_fork(fork, changes) {
+                        self.pending.runs.push_front(waiting);
+                        break;
+                    }
                 }
-            } else if run.is_none_or(|run| run.finished) {
-                self.pending.forks.remove(0);
-                let text = format!("Fork {} not restored: run {} ends before its first step", fork.name, fork.parent);
-                self.notices.push(text);
             }
         }
+        let recording = self.recording();
         if let Some(cursor_ns) = self.pending.cursor_ns
-            && self.pending.forks.is_empty()
+            && self.pending.runs.is_empty()
             && recording.computed_ns() >= cursor_ns.min(recording.last_stamp_ns())
             && (recording.computed_ns() >= cursor_ns || recording.runs.iter().all(|run| run.finished))
         {
             self.pending.cursor_ns = None;
             self.cursor = self.cursor.seek(&recording, cursor_ns);
         }
+    }
+
+    /// Starts a fork; returns it while its parent has not reached its first step.
+    fn restore_fork(&mut self, fork: SavedFork, changes: ForkChanges) -> Option<PendingRun> {
+        let recording = self.recording();
+        let parent = recording.runs.iter().position(|run| run.spec.label == fork.parent);
+        let run = parent.and_then(|parent| recording.runs.get(parent));
+        let reached = run.and_then(|run| run.steps.last()).is_some_and(|last| last.report.stamp_ns >= fork.stamp_ns);
+        if let (Some(parent), true) = (parent, reached) {
+            // Released before the record changes; otherwise the record would be copied.
+            drop(recording);
+            if let Err(problem) = self.fork_at(parent, fork.stamp_ns, &changes, Some(fork.name)) {
+                self.notices.push(problem);
+            }
+        } else if run.is_none_or(|run| run.finished) {
+            let text = format!("Fork {} not restored: run {} ends before its first step", fork.name, fork.parent);
+            self.notices.push(text);
+        } else {
+            return Some(PendingRun::Fork(fork, changes));
+        }
+        None
     }
 }
 
@@ -176,7 +221,9 @@ mod tests {
 
     fn settled(session: &mut Session) {
         let busy = |session: &Session| {
-            session.pending.cursor_ns.is_some() || session.recording().runs.iter().any(|run| !run.finished)
+            !session.pending.runs.is_empty()
+                || session.pending.cursor_ns.is_some()
+                || session.recording().runs.iter().any(|run| !run.finished)
         };
         while busy(session) {
             session.advance(0.0);
@@ -201,6 +248,7 @@ mod tests {
         let changes: ForkChanges = "classical,freeze=yaw.d".parse().unwrap();
         session.apply(Command::Fork { run: 0, changes, label: None });
         assert!(session.take_notices().is_empty());
+        session.apply(Command::AddRun("static".parse().unwrap()));
         settled(&mut session);
         session.apply(Command::StepFrames(1));
         let layout = serde_json::json!({ "panels": [1, 2] });
@@ -213,7 +261,11 @@ mod tests {
         assert_eq!(again.layout(), Some(&layout));
         assert_eq!(again.saved(Some(layout)), saved);
         let (before, after) = (session.recording(), again.recording());
-        assert_eq!(before.runs.len(), after.runs.len());
+        let labels = |recording: &crate::session::Recording| -> Vec<String> {
+            recording.runs.iter().map(|run| run.spec.label.clone()).collect()
+        };
+        assert_eq!(labels(&before).len(), 3);
+        assert_eq!(labels(&before), labels(&after), "runs keep their places, and with them their colours");
         // A smaller memory budget summarizes older steps immediately.
         assert!(after.runs.iter().all(|run| run.memory.summaries == 0));
         again.apply(Command::SetMemoryBudget(1 << 20));

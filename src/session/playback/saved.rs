@@ -2,6 +2,7 @@
 //!
 //! Results are not stored; they are recomputed to the same bits.
 
+use std::collections::VecDeque;
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
@@ -70,6 +71,10 @@ pub struct SavedSession {
     pub trajectories: Vec<String>,
     /// The forks, each after its parent.
     pub forks: Vec<SavedFork>,
+    /// Names of all runs and forks in their order in the window; empty in files of earlier programs, whose forks follow
+    /// the runs.
+    #[serde(default)]
+    pub order: Vec<String>,
     pub breakpoints: Vec<SavedBreakpoint>,
     /// Version 1 has stamps under the key `markers_ns`.
     #[serde(default, alias = "markers_ns")]
@@ -163,11 +168,28 @@ pub(super) fn entry_error(error: impl ToString) -> SavedSessionError {
     SavedSessionError::Entry { problem: error.to_string() }
 }
 
-/// Forks and cursor position of a saved session that are still to be restored.
+/// Runs and cursor position of a saved session that are still to be restored.
 #[derive(Clone, Debug, Default)]
 pub(in crate::session) struct PendingRestore {
-    pub(in crate::session) forks: Vec<(SavedFork, ForkChanges)>,
+    /// The first fork and what follows it, so that every run gets its place again, and with it its colour.
+    pub(in crate::session) runs: VecDeque<PendingRun>,
     pub(in crate::session) cursor_ns: Option<i64>,
+}
+
+/// Run of a saved session that is not started yet.
+#[derive(Clone, Debug)]
+pub(in crate::session) enum PendingRun {
+    Run(RunSpec),
+    Fork(SavedFork, ForkChanges),
+}
+
+impl PendingRun {
+    pub(in crate::session) fn label(&self) -> &str {
+        match self {
+            Self::Run(spec) => &spec.label,
+            Self::Fork(fork, _) => &fork.name,
+        }
+    }
 }
 
 #[cfg(all(test, unix))]
@@ -195,6 +217,7 @@ mod tests {
             prior: Some(SavedPrior { folder: path(b"/logs/\xfc/minimal"), growth: 2.0 }),
             trajectories: Vec::new(),
             forks: Vec::new(),
+            order: Vec::new(),
             breakpoints: Vec::new(),
             markers: vec![Marker::new(5, "turn")],
             cursor_ns: 0,
