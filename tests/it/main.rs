@@ -42,3 +42,5 @@ mod sweep;
 mod thresholds;
 mod time_travel;
 mod trajectories;
+#[cfg(feature = "gui")]
+mod tutorial;
