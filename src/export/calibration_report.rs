@@ -190,14 +190,15 @@ fn chain_parameters(run: &CalibrationRun, outcome: &CalibrationOutcome) -> Vec<P
         .map(|(place, parameter)| {
             let ground_truth = ground_truth.as_ref().map(|values| values[place]);
             let dimension = parameter.parameter.dimension();
+            let initial = parameter.parameter.principal_value(parameter.initial);
             ParameterReport {
                 name: names.name(parameter.parameter),
                 dimension,
-                initial: parameter.parameter.principal_value(parameter.initial),
-                last: parameter.parameter.principal_value(parameter.value),
+                initial,
+                last: parameter.parameter.value_near(initial, parameter.value),
                 sigma: parameter.sigma,
                 prior_sigma: Some(parameter.prior_sigma),
-                ground_truth: ground_truth.map(|ground_truth| parameter.parameter.principal_value(ground_truth)),
+                ground_truth: ground_truth.map(|ground_truth| parameter.parameter.value_near(initial, ground_truth)),
                 error: ground_truth.map(|ground_truth| dimension.difference(parameter.value, ground_truth)),
             }
         })

@@ -1,5 +1,7 @@
 //! Identity of a calibration parameter and its name.
 
+use std::f64::consts::TAU;
+
 use crate::geometry::{Dimension, principal_angle};
 use crate::table::Shown;
 use crate::text::Named;
@@ -173,6 +175,13 @@ impl ParameterId {
         let is_angle =
             self.dimension() == Dimension::Angle && matches!(self.part, ParameterPart::Base | ParameterPart::Link(_));
         if is_angle { principal_angle(value) } else { value }
+    }
+
+    /// The value plus the multiple of 2π that brings it nearest to a reference, for angles that have a principal value;
+    /// all others unchanged. Values of one run are shown near its first one, so that they do not jump at ±π.
+    pub fn value_near(self, reference: f64, value: f64) -> f64 {
+        let turns = (self.principal_value(value - reference) - (value - reference)) / TAU;
+        if turns.is_finite() { value + turns.round() * TAU } else { value }
     }
 
     pub const fn is_joint_offset(self) -> bool {
@@ -458,6 +467,17 @@ mod tests {
         );
         assert_eq!(named.parse("L2.alpha"), Some(id));
         assert_eq!(named.name(ParameterId::timeshift(1)), "cam4.timeshift");
+    }
+
+    #[test]
+    fn an_angle_is_shown_near_its_first_value_and_a_length_as_it_is() {
+        let names = ParameterNames::default();
+        let [angle, length, vector] = ["I.rx", "I.tx", "EC.rx"].map(|name| names.parse(name).unwrap());
+        let near = |reference: f64, value: f64| angle.value_near(reference, value);
+        assert!((near(3.13, -3.13) - (TAU - 3.13)).abs() < 1e-12);
+        assert!((near(-3.13, 9.0) - (9.0 - 2.0 * TAU)).abs() < 1e-12);
+        assert_eq!((near(3.13, 3.0), near(f64::NAN, 3.0)), (3.0, 3.0));
+        assert_eq!((length.value_near(0.1, 9.0), vector.value_near(3.13, -3.13)), (9.0, -3.13));
     }
 
     #[test]

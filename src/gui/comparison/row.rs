@@ -81,7 +81,7 @@ pub(super) fn row_ui(
     };
     let rect = within_gutters(outer, TIME_GUTTER);
     let (begin_ns, end_ns) = visible_range(ctx);
-    let mut area = PlotArea { rect, begin_ns, end_ns, low: 0.0, high: 1.0 };
+    let mut area = PlotArea { rect, begin_ns, end_ns, low: 0.0, high: 1.0, middle: None };
     let mut max_value = 0.0_f64;
     let most = |curve: &Curve| curve.extent.map_or(0.0, |(_, max_value)| max_value);
     let mut max_bound = 0.0_f64;
@@ -146,13 +146,6 @@ pub(super) fn row_ui(
     });
     let read: Vec<ReadLine<'_>> = read.collect();
     let unit = if row.unit.is_empty() || row.unit == "°" { row.unit.to_owned() } else { format!(" {}", row.unit) };
-    let readout = Readout {
-        key: row.label,
-        lines: &read,
-        factor: row.factor,
-        unit: &unit,
-        whole: row.unit.is_empty(),
-        principal: &|value| value,
-    };
+    let readout = Readout { key: row.label, lines: &read, factor: row.factor, unit: &unit, whole: row.unit.is_empty() };
     plot_ui(ui, ctx, &area, &plot, &readout).on_hover_text(row.hover);
 }

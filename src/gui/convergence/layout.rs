@@ -14,8 +14,10 @@ const MIN_CELL_WIDTH: f32 = 118.0;
 const MIN_HEIGHT_WITH_TIMES: f32 = 92.0;
 /// Height of the labels of times in points.
 const TIMES_HEIGHT: f32 = TIME_GUTTER - TICKS_ONLY;
-/// Gap between plots in points.
+/// Gap between rows of plots in points.
 const GAP: f32 = 5.0;
+/// Gap between columns in points: the value above a plot is not read as a part of the next plot's name.
+const COLUMN_GAP: f32 = 14.0;
 /// Width of the headings at the left of the rows, in points.
 pub(crate) const HEADING_WIDTH: f32 = 46.0;
 /// Height of the headings above groups, in points.
@@ -79,7 +81,7 @@ fn by_part(parameters: &[ParameterId], available: Rect) -> Option<PlotGrid> {
         }
     }
     let columns = rows.iter().map(|(_, count)| *count).max()?;
-    let width = (available.width() - HEADING_WIDTH - GAP * columns as f32) / columns as f32;
+    let width = (available.width() - HEADING_WIDTH - COLUMN_GAP * columns as f32) / columns as f32;
     let height = (available.height() - GAP * (rows.len() as f32 - 1.0)) / rows.len() as f32;
     // The layout by rows leaves cells free; it is used only if plots stay legible and few cells are empty.
     let empty = rows.len() * columns - parameters.len();
@@ -92,9 +94,10 @@ fn by_part(parameters: &[ParameterId], available: Rect) -> Option<PlotGrid> {
     }
     let counts: Vec<usize> = rows.iter().map(|(_, count)| *count).collect();
     let legend = free_corner(&counts, columns).map(|(first, free_rows, free_columns)| {
-        let size = vec2(free_columns as f32 * (width + GAP) - GAP, free_rows as f32 * (height + GAP) - GAP);
+        let size =
+            vec2(free_columns as f32 * (width + COLUMN_GAP) - COLUMN_GAP, free_rows as f32 * (height + GAP) - GAP);
         let top = available.top() + first as f32 * (height + GAP);
-        Rect::from_min_size(pos2(available.right() - size.x - GAP, top), size)
+        Rect::from_min_size(pos2(available.right() - size.x, top), size)
     });
     let mut layout =
         PlotGrid { cells: Vec::new(), groups: Vec::new(), headings: Vec::new(), legend, height: available.height() };
@@ -103,7 +106,7 @@ fn by_part(parameters: &[ParameterId], available: Rect) -> Option<PlotGrid> {
         let heading = Rect::from_min_size(pos2(available.left(), top), vec2(HEADING_WIDTH, height));
         layout.headings.push((part, heading));
         layout.cells.extend((0..count).map(|column| {
-            let left = available.left() + HEADING_WIDTH + GAP + column as f32 * (width + GAP);
+            let left = available.left() + HEADING_WIDTH + COLUMN_GAP + column as f32 * (width + COLUMN_GAP);
             Rect::from_min_size(pos2(left, top), vec2(width, height))
         }));
     }
@@ -126,10 +129,11 @@ fn free_corner(counts: &[usize], columns: usize) -> Option<(usize, usize, usize)
 
 fn flowing(count: usize, available: Rect) -> PlotGrid {
     const WANTED_ASPECT: f32 = 2.0;
-    let max_columns = (((available.width() + GAP) / (MIN_CELL_WIDTH + GAP)) as usize).clamp(1, count.max(1));
+    let max_columns =
+        (((available.width() + COLUMN_GAP) / (MIN_CELL_WIDTH + COLUMN_GAP)) as usize).clamp(1, count.max(1));
     let size = |columns: usize| {
         let rows = count.div_ceil(columns).max(1);
-        let width = (available.width() - GAP * (columns as f32 - 1.0)) / columns as f32;
+        let width = (available.width() - COLUMN_GAP * (columns as f32 - 1.0)) / columns as f32;
         let height = (available.height() - GAP * (rows as f32 - 1.0)) / rows as f32;
         vec2(width.max(1.0), height.max(MIN_CELL_HEIGHT))
     };
@@ -144,7 +148,8 @@ fn flowing(count: usize, available: Rect) -> PlotGrid {
     let size = size(columns);
     let cells: Vec<Rect> = (0..count)
         .map(|index| {
-            let corner = vec2((index % columns) as f32 * (size.x + GAP), (index / columns) as f32 * (size.y + GAP));
+            let corner =
+                vec2((index % columns) as f32 * (size.x + COLUMN_GAP), (index / columns) as f32 * (size.y + GAP));
             Rect::from_min_size(available.min + corner, size)
         })
         .collect();
@@ -156,12 +161,12 @@ fn flowing(count: usize, available: Rect) -> PlotGrid {
 /// heading only.
 pub(crate) fn by_group(groups: &[(ParameterGroup, usize)], available: Rect) -> PlotGrid {
     let largest = groups.iter().map(|(_, count)| *count).max().unwrap_or(0).max(1);
-    let max_columns = (((available.width() + GAP) / (MIN_CELL_WIDTH + GAP)) as usize).clamp(1, largest);
+    let max_columns = (((available.width() + COLUMN_GAP) / (MIN_CELL_WIDTH + COLUMN_GAP)) as usize).clamp(1, largest);
     let rows_of = |columns: usize| groups.iter().map(|(_, count)| count.div_ceil(columns)).sum::<usize>();
     // The fewest columns that give the smallest number of rows, so that the plots are as wide as possible.
     let fewest = rows_of(max_columns);
     let columns = (1..=max_columns).find(|columns| rows_of(*columns) == fewest).unwrap_or(max_columns);
-    let width = (available.width() - GAP * (columns as f32 - 1.0)) / columns as f32;
+    let width = (available.width() - COLUMN_GAP * (columns as f32 - 1.0)) / columns as f32;
     let room = available.height() - groups.len() as f32 * GROUP_HEIGHT - TIMES_HEIGHT;
     let height = (room / fewest.max(1) as f32 - GAP).max(MIN_CELL_HEIGHT);
     let mut layout = PlotGrid {
@@ -177,7 +182,8 @@ pub(crate) fn by_group(groups: &[(ParameterGroup, usize)], available: Rect) -> P
         layout.groups.push((*group, heading));
         top += GROUP_HEIGHT;
         layout.cells.extend((0..*count).map(|index| {
-            let corner = vec2((index % columns) as f32 * (width + GAP), (index / columns) as f32 * (height + GAP));
+            let corner =
+                vec2((index % columns) as f32 * (width + COLUMN_GAP), (index / columns) as f32 * (height + GAP));
             Rect::from_min_size(pos2(available.left(), top) + corner, vec2(width.max(1.0), height))
         }));
         top += count.div_ceil(columns) as f32 * (height + GAP);

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use egui::{Align2, Color32, Painter, Pos2, Rangef, Rect, Stroke, StrokeKind, Ui, pos2, vec2};
+use egui::{Align2, Color32, Painter, Rangef, Rect, Stroke, StrokeKind, Ui, pos2, vec2};
 
 use super::model::{CalibrationHistory, ConvertedHistory, ParameterCurve};
 use super::range::{paint_outside, value_range};
@@ -15,14 +15,13 @@ use crate::gui::determination::look_of;
 use crate::gui::help::terms::window;
 use crate::gui::parameter_names::{CalibrationPart, heading_of, meaning_of};
 use crate::gui::plot::{
-    BandCurve, Clicks, Curve, Interaction, PlotArea, ReadLine, Readout, StateCurve, Wheel, is_named_within, paint_band,
-    paint_curve, paint_ground, paint_hatch, paint_line, paint_time_axis, paint_value_axis, plot_ui, value_range_of,
-    visible_range, within_gutters,
+    BandCurve, Clicks, Curve, Interaction, PlotArea, ReadLine, Readout, StateCurve, Wheel, paint_band, paint_curve,
+    paint_ground, paint_hatch, paint_line, paint_time_axis, paint_value_axis, plot_ui, value_range_of, visible_range,
+    within_gutters,
 };
 use crate::gui::theme::{self, CURVE_WIDTH, Theme};
 use crate::gui::under_pointer::{Item, offer, offer_item};
 use crate::gui::units::{Shown, fixed};
-use crate::gui::widgets::plated_text;
 use crate::observability::Determination;
 use crate::text::Named as _;
 
@@ -32,6 +31,10 @@ const STRIP_HEIGHT: f32 = 3.0;
 const SAMPLE_WIDTH: f32 = 26.0;
 /// Height of the line with name and value, in points.
 const TITLE_HEIGHT: f32 = 15.0;
+/// Height of the line with verdict and error below it, in points.
+const NOTE_HEIGHT: f32 = 13.0;
+/// Height of a cell above its times from which on it has that line, in points.
+const MIN_HEIGHT_WITH_NOTE: f32 = 70.0;
 
 /// Verdicts with a mark in the plots.
 pub(super) const MARKED: [Determination; 6] = [
@@ -196,7 +199,7 @@ impl<'a> PlotData<'a> {
             let value = values.get(row).copied().filter(|value| value.is_finite())?;
             let outside = if (area.low..=area.high).contains(&value) { "" } else { ", outside the axis range" };
             let label = &ctx.recording.runs.get(run)?.spec.label;
-            let value = shown.value(parameter.principal_value(value), f64::NAN);
+            let value = shown.value(value, f64::NAN);
             Some(format!("{label}: {value}{outside}"))
         };
         runs.iter().filter(|run| **run != self.shown).filter_map(|run| line(*run)).collect()
@@ -219,8 +222,10 @@ pub(super) fn cell_ui(
     let name = &ctx.names().name(id);
     let theme = *ctx.theme;
     let (begin_ns, end_ns) = visible_range(ctx);
-    let plot = within_gutters(rect.with_min_y(rect.top() + TITLE_HEIGHT), below);
-    let mut area = PlotArea { rect: plot, begin_ns, end_ns, low: 0.0, high: 1.0 };
+    let has_note = rect.height() - below >= MIN_HEIGHT_WITH_NOTE;
+    let above = TITLE_HEIGHT + if has_note { NOTE_HEIGHT } else { 0.0 };
+    let plot = within_gutters(rect.with_min_y(rect.top() + above), below);
+    let mut area = PlotArea { rect: plot, begin_ns, end_ns, low: 0.0, high: 1.0, middle: None };
 
     let overlaid: Vec<usize> = (0..data.histories.len()).filter(|run| data.values(*run, id).is_some()).collect();
     data.update_curves(curves, &area, id, parameter, &overlaid);
@@ -228,20 +233,21 @@ pub(super) fn cell_ui(
     let ground_truth = data.ground_truth.get(&id).map(|truth| parameter.unwrap_near(id, *truth));
     let extent_of = |run: usize| curve_of(run)?.value.extent;
     let others = overlaid.iter().filter(|run| **run != shown_run).filter_map(|run| extent_of(*run));
-    let (low, high) = value_range(extent_of(shown_run), ground_truth, others, parameter);
+    let (automatic, middle) = value_range(extent_of(shown_run), ground_truth, others, parameter);
     let key = format!("convergence {name}");
-    let (low, high) = value_range_of(ctx, &key, low, high);
+    let (low, high) = value_range_of(ctx, &key, automatic.0, automatic.1);
     area = area.with_values(low, high);
+    if let Some(middle) = middle.filter(|_| (low, high) == automatic) {
+        area = area.broken(middle);
+    }
 
     let painter = ui.painter_at(rect.expand(1.0));
     let inner = painter.with_clip_rect(plot);
     paint_ground(&painter, &theme, plot);
-    if let Some(curves) = curve_of(shown_run) {
-        paint_verdicts(&inner, &theme, &area, curves);
-    }
     paint_value_axis(&painter, &theme, &area, shown.factor);
     paint_time_axis(&painter, &theme, &area, below);
     if let Some(curves) = curve_of(shown_run) {
+        paint_verdicts(&inner, &theme, &area, curves);
         let fill = theme.run(shown_run).color.gamma_multiply(0.22);
         paint_band(&inner, &area, &curves.band, fill);
     }
@@ -258,19 +264,19 @@ pub(super) fn cell_ui(
     let row = history.row_at(ctx.cursor_ns);
     let verdict = data.verdicts.verdict(id, data.verdicts.row_at(ctx.cursor_ns));
     let value = row.map(|row| (parameter.values[row], parameter.sigmas[row]));
-    let shown_value = value.map(|(value, sigma)| (id.principal_value(value), sigma));
-    title(&painter, ctx, rect, name, shown, shown_value, verdict, selected);
-    if MARKED.contains(&verdict) {
-        paint_verdict_name(&painter, &inner, ctx, &area, verdict);
-    }
-
+    title(&painter, ctx, rect, name, shown, value, verdict, selected);
     let error =
         value.zip(ground_truth).map(|((value, sigma), ground_truth)| (id.principal_value(value - ground_truth), sigma));
-    if let Some((error, sigma)) = error {
-        paint_error(&inner, &theme, plot, shown, (error, sigma));
+    if has_note {
+        let error = error.map(|(error, sigma)| {
+            let color = if error.abs() > 3.0 * sigma { theme.error } else { theme.text_weak };
+            (format!("Δ {}", error_text(shown, error, sigma)), color)
+        });
+        let line = Rect::from_x_y_ranges(rect.x_range(), Rangef::new(rect.top() + TITLE_HEIGHT, plot.top()));
+        note(&painter, &theme, line, verdict, error);
     }
 
-    let text = value_text(shown, shown_value, error);
+    let text = value_text(shown, value, error);
     let label = format!("{name} {text} {}", verdict.name());
     let widget = ui.unique_id().with(("parameter", name));
     let plot = Interaction { id: widget, name: label.trim_end(), value: "", clicks: Clicks::Select, wheel: data.wheel };
@@ -284,7 +290,6 @@ pub(super) fn cell_ui(
         factor: shown.factor,
         unit: shown.unit,
         whole: false,
-        principal: &|value| id.principal_value(value),
     };
     let response = plot_ui(ui, ctx, &area, &plot, &readout);
     if response.hovered() {
@@ -325,40 +330,20 @@ fn paint_runs<'c>(
     }
 }
 
-/// Name of a verdict in a corner of the plot where no reading cursor is named, or its mark alone.
-fn paint_verdict_name(
-    painter: &Painter,
-    inner: &Painter,
-    ctx: &PanelContext<'_>,
-    area: &PlotArea,
-    verdict: Determination,
-) {
-    let plot = area.rect;
-    let (mark, color) = look_of(verdict, ctx.theme);
-    let width = |text: &str| painter.layout_no_wrap(text.to_owned(), theme::label_font(), color).size().x;
-    let [left, right] = [plot.left() + 3.0, plot.right() - 3.0];
-    let named =
-        |left: f32, text: &str| is_named_within(painter, ctx, area, Rangef::new(left - 2.0, left + width(text) + 2.0));
-    let texts = [verdict.name(), mark].into_iter().filter(|text| *text == mark || width(text) + 6.0 <= plot.width());
-    let corners = texts.flat_map(|text| [(text, right - width(text)), (text, left)]);
-    // The name of a reading cursor neither covers the verdict nor is covered.
-    let free = corners.into_iter().find(|(text, left)| !named(*left, text));
-    let (text, place) = match free {
-        Some((text, left)) => (text, pos2(left, plot.top() + 1.0)),
-        None => (mark, pos2(right - width(mark), plot.top() + TITLE_HEIGHT)),
-    };
-    boxed_text(inner, ctx.theme, place, Align2::LEFT_TOP, text, color);
-}
-
-/// Error against the ground truth in the lower right corner, with its multiple of σ where the plot stays visible.
-fn paint_error(painter: &Painter, theme: &Theme, plot: Rect, shown: Shown, (error, sigma): (f64, f64)) {
-    let far = error.abs() > 3.0 * sigma;
-    let place = plot.right_bottom() + vec2(-3.0, -STRIP_HEIGHT - 1.0);
-    let color = if far { theme.error } else { theme.text_weak };
-    let texts = [error_text(shown, error, sigma), signed(shown, error, sigma)].map(|text| format!("Δ {text}"));
-    let width = |text: &String| painter.layout_no_wrap(text.clone(), theme::label_font(), color).size().x;
-    let text = texts.iter().find(|text| width(text) <= 0.6 * plot.width()).unwrap_or(&texts[1]);
-    boxed_text(painter, theme, place, Align2::RIGHT_BOTTOM, text, color);
+/// Draws verdict and error against the ground truth in the line above a plot, in as many words as fit.
+fn note(painter: &Painter, theme: &Theme, line: Rect, verdict: Determination, error: Option<(String, Color32)>) {
+    let width = |text: &str| painter.layout_no_wrap(text.to_owned(), theme::label_font(), theme.text).size().x;
+    let mut room = line.width();
+    if let Some((text, color)) = error.filter(|(text, _)| width(text) <= line.width()) {
+        painter.text(line.right_top(), Align2::RIGHT_TOP, &text, theme::label_font(), color);
+        room -= width(&text) + 8.0;
+    }
+    if MARKED.contains(&verdict) {
+        let (mark, color) = look_of(verdict, theme);
+        if let Some(text) = [verdict.name(), mark].into_iter().find(|text| width(text) <= room) {
+            painter.text(line.left_top(), Align2::LEFT_TOP, text, theme::label_font(), color);
+        }
+    }
 }
 
 /// Value ± 1 σ at the cursor and its error with the multiple of σ, empty without an estimate.
@@ -433,12 +418,6 @@ fn title(
 fn fixed_value(shown: Shown, value: f64, sigma: f64) -> String {
     let text = shown.value(value, sigma);
     text.strip_suffix(shown.unit).map_or_else(|| fixed(value, 2), str::to_owned)
-}
-
-/// Draws a text with a background, legible over curves.
-fn boxed_text(painter: &Painter, theme: &Theme, place: Pos2, align: Align2, text: &str, color: Color32) {
-    let galley = painter.layout_no_wrap(text.to_owned(), theme::label_font(), color);
-    plated_text(painter, place, align, (galley, color), (theme.plot_background, vec2(2.0, 0.0)));
 }
 
 /// The cached curves of one parameter of one run.

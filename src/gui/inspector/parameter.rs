@@ -26,7 +26,7 @@ pub(super) fn ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, step: &St
     let (value, sigma, prior) =
         (entry(&calibration.values), entry(&calibration.sigmas), entry(&calibration.prior_sigmas));
     let mut rows = vec![
-        (terms::VALUE, vec![shown.value(parameter.principal_value(value), sigma)]),
+        (terms::VALUE, vec![shown.value(run.shown_value(parameter, value), sigma)]),
         (terms::SIGMA, vec![shown.sigma(sigma)]),
         (terms::PRIOR_SIGMA, vec![shown.sigma(prior)]),
         (terms::RATIO, vec![fixed(sigma / prior, 3)]),
@@ -40,7 +40,10 @@ pub(super) fn ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, step: &St
     let ground_truth =
         true_values(ctx.recording, run, ctx.cursor_ns).and_then(|ground_truth| ground_truth.get(&parameter).copied());
     if let Some(ground_truth) = ground_truth {
-        rows.push((terms::GROUND_TRUTH, vec![shown.value(parameter.principal_value(ground_truth), sigma)]));
+        rows.push((
+            terms::GROUND_TRUTH,
+            vec![shown.value(parameter.value_near(run.shown_value(parameter, value), ground_truth), sigma)],
+        ));
         let error = parameter.principal_value(value - ground_truth);
         let ratio = fixed(error.abs() / sigma, 1);
         rows.push((terms::ERROR, vec![format!("{} ({ratio} σ)", shown.value(error, sigma))]));

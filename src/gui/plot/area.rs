@@ -14,7 +14,12 @@ pub(crate) struct PlotArea {
     pub(crate) low: f64,
     /// Value at the upper edge.
     pub(crate) high: f64,
+    /// Ends of the middle part of a broken scale, beyond which values are compressed; `None` for one linear scale.
+    pub(crate) middle: Option<[f64; 2]>,
 }
+
+/// Height of the part above the middle of a broken scale, and of the part below, as ratios of the plot's height.
+const OUTER: f64 = 0.18;
 
 impl PlotArea {
     /// Distance to the right of the left edge in points, limited to one plot width outside: dashes along a very long
@@ -32,14 +37,34 @@ impl PlotArea {
 
     /// Screen y of a value, limited to a few heights of the plot to avoid overflow.
     pub(crate) fn y(&self, value: f64) -> f32 {
-        let fraction = ((value - self.low) / (self.high - self.low)).clamp(-4.0, 5.0);
-        self.rect.bottom() - fraction as f32 * self.rect.height()
+        let fraction = match self.scale() {
+            None => (value - self.low) / (self.high - self.low),
+            Some(knots) => interpolated(&knots, value),
+        };
+        self.rect.bottom() - fraction.clamp(-4.0, 5.0) as f32 * self.rect.height()
     }
 
     /// Value at a screen y.
     pub(crate) fn value_at(&self, y: f32) -> f64 {
         let fraction = f64::from((self.rect.bottom() - y) / self.rect.height().max(1.0));
-        self.low + fraction * (self.high - self.low)
+        match self.scale() {
+            None => self.low + fraction * (self.high - self.low),
+            Some(knots) => interpolated(&knots.map(|[value, fraction]| [fraction, value]), fraction),
+        }
+    }
+
+    /// Breaks the scale at the ends of its middle part, which gets most of the height.
+    pub(crate) fn broken(self, middle: [f64; 2]) -> Self {
+        let [from, to] = middle;
+        let inside = self.low <= from && from < to && to <= self.high && (self.low < from || to < self.high);
+        Self { middle: inside.then_some(middle), ..self }
+    }
+
+    /// Values and fractions of the height of a broken scale.
+    fn scale(&self) -> Option<[[f64; 2]; 4]> {
+        let [from, to] = self.middle?;
+        let (below, above) = (if self.low < from { OUTER } else { 0.0 }, if to < self.high { OUTER } else { 0.0 });
+        Some([[self.low, 0.0], [from, below], [to, 1.0 - above], [self.high, 1.0]])
     }
 
     /// Stamp at a screen x.
@@ -56,6 +81,15 @@ impl PlotArea {
         (self.low, self.high) = (low - widen, high + widen);
         self
     }
+}
+
+/// Ordinate at an abscissa on a line through four points, which continues beyond its ends.
+fn interpolated(points: &[[f64; 2]; 4], at: f64) -> f64 {
+    let piece = if at < points[1][0] { 0 } else { usize::from(at > points[2][0]) + 1 };
+    // Without an outer part the middle continues.
+    let piece = if points[piece][0] < points[piece + 1][0] { piece } else { 1 };
+    let [[x0, y0], [x1, y1]] = [points[piece], points[piece + 1]];
+    y0 + (at - x0) / (x1 - x0) * (y1 - y0)
 }
 
 /// Time ranges of the rows for which `holds` is true: from the stamp of the first row to the stamp of the row after the
@@ -113,7 +147,7 @@ mod tests {
     #[test]
     fn a_flickering_state_has_few_segments() {
         let rect = Rect::from_min_max(pos2(0.0, 0.0), pos2(100.0, 10.0));
-        let area = PlotArea { rect, begin_ns: 0, end_ns: 12_000, low: 0.0, high: 1.0 };
+        let area = PlotArea { rect, begin_ns: 0, end_ns: 12_000, low: 0.0, high: 1.0, middle: None };
         let stamps: Vec<i64> = (0..12_000).collect();
         let flickers = visible_segments(&area, &stamps, |row| row % 2 == 0);
         assert!(flickers.len() == 1 && flickers[0].max > 99.0, "{flickers:?}");
@@ -128,11 +162,23 @@ mod tests {
     #[test]
     fn the_mapping_goes_back_and_forth_and_survives_empty_ranges() {
         let rect = Rect::from_min_max(pos2(100.0, 10.0), pos2(300.0, 60.0));
-        let area = PlotArea { rect, begin_ns: 5, end_ns: 5_000_005, low: 0.0, high: 0.0 }.with_values(2.0, 2.0);
+        let area =
+            PlotArea { rect, begin_ns: 5, end_ns: 5_000_005, low: 0.0, high: 0.0, middle: None }.with_values(2.0, 2.0);
         assert_eq!(area.stamp_ns_at(area.x(2_500_005)), 2_500_005);
         assert_eq!(area.y(2.0), 35.0);
         let tall = area.with_values(-3.0, 5.0);
         assert!((tall.value_at(tall.y(1.25)) - 1.25).abs() < 1e-6);
+        let broken = tall.broken([0.0, 0.5]);
+        for value in [-3.0, -1.0, 0.0, 0.2, 0.5, 3.0, 5.0] {
+            assert!((broken.value_at(broken.y(value)) - value).abs() < 1e-5, "{value}");
+        }
+        let height = |area: &PlotArea| area.y(0.0) - area.y(0.5);
+        assert!(
+            height(&broken) > 8.0 * height(&tall) && broken.y(5.0) == rect.top() && broken.y(-3.0) == rect.bottom()
+        );
+        let above = tall.broken([-3.0, 0.0]);
+        assert!(above.y(-3.0) == rect.bottom() && above.y(0.0) > above.y(0.5) && above.y(5.0) == rect.top());
+        assert_eq!(tall.broken([-3.0, 5.0]).middle, None);
         let nothing = PlotArea { end_ns: 5, ..area }.with_values(f64::NAN, f64::NAN);
         assert!(nothing.x(5).is_finite() && nothing.y(0.3).is_finite());
     }

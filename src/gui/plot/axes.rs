@@ -1,6 +1,6 @@
 //! Axes of plots over time: values in a gutter on the left, times in a gutter below.
 
-use egui::{Align2, Painter, Rect, Stroke, pos2, vec2};
+use egui::{Align2, Painter, Rangef, Rect, Stroke, pos2, vec2};
 
 use super::area::PlotArea;
 use super::axis::{decimals_of_step, ticks};
@@ -34,18 +34,34 @@ pub(crate) fn within_gutters(outer: Rect, below: f32) -> Rect {
 }
 
 /// Draws grid lines of values with their labels in the gutter on the left; `factor` converts stored values to shown
-/// ones.
+/// ones. On a broken scale, the compressed parts are shaded and labelled at the edges.
 pub(crate) fn paint_value_axis(painter: &Painter, theme: &Theme, area: &PlotArea, factor: f64) {
-    let max_count = ((area.rect.height() / VALUE_PITCH).round() as usize).max(1);
-    let (marks, step) = ticks(area.low * factor, area.high * factor, max_count);
-    for shown in marks {
-        let y = area.y(shown / factor).round() + 0.5;
-        painter.hline(area.rect.x_range(), y, Stroke::new(HAIRLINE_WIDTH, theme.grid));
+    let [from, to] = area.middle.unwrap_or([area.low, area.high]);
+    let height = area.y(from) - area.y(to);
+    let max_count = ((height / VALUE_PITCH).round() as usize).max(1);
+    let (marks, step) = ticks(from * factor, to * factor, max_count);
+    let label = |shown: f64, y: f32, step: f64| {
         // A label at an edge stays between the edges.
         let (top, bottom) = (area.rect.top() + HALF_LABEL, area.rect.bottom() - HALF_LABEL);
         let at = pos2(area.rect.left() - 3.0, y.min(bottom).max(top));
-        let text = fixed(shown, decimals_of_step(step));
-        painter.text(at, Align2::RIGHT_CENTER, text, number_font(), theme.text_weak);
+        painter.text(at, Align2::RIGHT_CENTER, fixed(shown, decimals_of_step(step)), number_font(), theme.text_weak);
+    };
+    let ends = [(area.high, to, area.rect.top()), (area.low, from, area.rect.bottom())];
+    let outer: Vec<_> = ends.into_iter().filter(|(end, inner, _)| end != inner).collect();
+    for (end, inner, edge) in &outer {
+        let part = Rect::from_x_y_ranges(area.rect.x_range(), Rangef::new(*edge, area.y(*inner)).as_positive());
+        painter.rect_filled(part, 0.0, theme.grid.gamma_multiply(0.6));
+        painter.hline(area.rect.x_range(), area.y(*inner), Stroke::new(HAIRLINE_WIDTH, theme.outline));
+        // Two digits of the compressed part.
+        let step = 10_f64.powf(((end - inner).abs() * factor).log10().floor());
+        label(end * factor, *edge, step);
+    }
+    for shown in marks {
+        let y = area.y(shown / factor).round() + 0.5;
+        painter.hline(area.rect.x_range(), y, Stroke::new(HAIRLINE_WIDTH, theme.grid));
+        if outer.iter().all(|(_, _, edge)| (y - edge).abs() > 3.0 * HALF_LABEL) {
+            label(shown, y, step);
+        }
     }
 }
 

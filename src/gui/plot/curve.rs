@@ -213,6 +213,7 @@ mod tests {
             end_ns: 10_000,
             low: 0.0,
             high: 1.0,
+            middle: None,
         }
     }
 

@@ -23,9 +23,7 @@ pub(crate) use axis::{ValueAxis, decimals_of_step, ticks};
 pub(crate) use curve::{BandCurve, Curve, StateCurve};
 pub(crate) use navigate::{Clicks, Interaction, Wheel, navigate, visible_range, zoom_about_cursor};
 pub(crate) use on_screen::{PlotOnScreen, plot_under_pointer, register};
-pub(crate) use readout::{
-    ReadLine, Readout, is_named_within, paint_time_labels, paint_times, paint_values, read_lines,
-};
+pub(crate) use readout::{ReadLine, Readout, paint_time_labels, paint_times, paint_values, read_lines};
 pub(crate) use run_legend::run_legend_ui;
 pub(crate) use value_axis::value_range_of;
 pub(crate) use value_plot::{GridLine, ValuePlot, paint_between};

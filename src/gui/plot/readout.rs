@@ -59,14 +59,13 @@ pub(crate) struct Readout<'a> {
     pub(crate) unit: &'a str,
     /// True for counts, which are shown without decimals.
     pub(crate) whole: bool,
-    /// Shown value of a stored one within the period of an angle, both in stored units.
-    pub(crate) principal: &'a dyn Fn(f64) -> f64,
 }
 
 impl Readout<'_> {
     fn text(&self, area: &PlotArea, stored: f64) -> String {
         // Three digits of the axis.
-        let step = (area.high - area.low).abs() * self.factor / 500.0;
+        let [from, to] = area.middle.unwrap_or([area.low, area.high]);
+        let step = (to - from).abs() * self.factor / 500.0;
         let decimals = if self.whole { 0 } else { decimals_of_step(step) };
         format!("{}{}", fixed(stored * self.factor, decimals), self.unit)
     }
@@ -80,7 +79,7 @@ impl Readout<'_> {
     fn tags_at(&self, area: &PlotArea, stamp_ns: i64) -> Vec<Tag> {
         let tag = |line: &ReadLine<'_>| {
             let value = line.at(stamp_ns)?;
-            Some(Tag { y: area.y(value), color: line.color, text: self.text(area, (self.principal)(value)) })
+            Some(Tag { y: area.y(value), color: line.color, text: self.text(area, value) })
         };
         self.lines.iter().filter_map(tag).collect()
     }
@@ -152,17 +151,6 @@ pub(crate) fn paint_time_labels(painter: &Painter, ctx: &PanelContext<'_>, area:
         let center = x.min(area.rect.right() - half).max(area.rect.left() + half);
         boxed_text(painter, pos2(center, top), Align2::CENTER_TOP, &text, theme.text_strong, theme.surface_raised);
     }
-}
-
-/// True if the name of a reading cursor covers a part of a range of screen x at the top of a plot.
-pub(crate) fn is_named_within(painter: &Painter, ctx: &PanelContext<'_>, area: &PlotArea, columns: Rangef) -> bool {
-    let with_times = area.rect.width() > MIN_WIDTH_WITH_TIMES;
-    ReadingCursor::ALL.into_iter().any(|cursor| {
-        let Some(stamp_ns) = ctx.selection.reading.cursor_ns(cursor) else { return false };
-        let text = name_of(cursor, stamp_ns, with_times);
-        let half = 0.5 * painter.layout_no_wrap(text, number_font(), ctx.theme.text).size().x + 2.0;
-        x_inside(area, stamp_ns).is_some_and(|x| columns.expand(half).contains(x))
-    })
 }
 
 /// Name of a reading cursor in a plot, with its time where there is room.
@@ -347,9 +335,8 @@ mod tests {
         let (first, second) = ([0.010, 0.0125], [0.020, 0.0195]);
         let lines = [line(&stamps, &first), line(&stamps, &second)];
         let rect = Rect::from_min_max(pos2(0.0, 0.0), pos2(100.0, 100.0));
-        let area = PlotArea { rect, begin_ns: 0, end_ns: 1_000_000_000, low: 0.0, high: 0.025 };
-        let readout =
-            Readout { key: "", lines: &lines, factor: 1e3, unit: " mm", whole: false, principal: &|value| value };
+        let area = PlotArea { rect, begin_ns: 0, end_ns: 1_000_000_000, low: 0.0, high: 0.025, middle: None };
+        let readout = Readout { key: "", lines: &lines, factor: 1e3, unit: " mm", whole: false };
         let texts = |tags: Vec<Tag>| tags.into_iter().map(|tag| tag.text).collect::<Vec<_>>();
         assert_eq!(texts(readout.tags_at(&area, 0)), ["10.00 mm", "20.00 mm"]);
         assert_eq!(texts(readout.difference_tags(&area, [0, 1_000_000_000])), ["Δ +2.50 mm", "Δ -0.50 mm"]);
@@ -360,7 +347,7 @@ mod tests {
     #[test]
     fn tags_are_beside_their_line_and_turn_at_the_edges() {
         let rect = Rect::from_min_max(pos2(50.0, 0.0), pos2(250.0, 60.0));
-        let area = PlotArea { rect, begin_ns: 0, end_ns: 1, low: 0.0, high: 1.0 };
+        let area = PlotArea { rect, begin_ns: 0, end_ns: 1, low: 0.0, high: 1.0, middle: None };
         let at = |x: f32, side: Side| tag_rects(&area, x, &[20.0, 22.0], &[60.0, 50.0], side);
         for (x, side, expected) in [
             (150.0, Side::Left, 145.0),

@@ -270,7 +270,7 @@ impl RankPanel {
         let (begin_ns, end_ns) = visible_range(ctx);
         let key = "Rank over time";
         let (low, high) = value_range_of(ctx, key, 0.0, max_rank * 1.08);
-        let area = PlotArea { rect, begin_ns, end_ns, low, high };
+        let area = PlotArea { rect, begin_ns, end_ns, low, high, middle: None };
         let caption = format!("informed rank over time, of {max_rank:.0} (faint: structural rank)");
         let place = all.left_top() + vec2(3.0, 0.0);
         ui.painter().text(place, egui::Align2::LEFT_TOP, caption, super::theme::label_font(), theme.text_weak);
@@ -294,7 +294,7 @@ impl RankPanel {
         let wheel = Wheel::in_list(self.overflows);
         let plot = Interaction { id, name: key, value: &value, clicks: Clicks::Seek, wheel };
         let lines = read_lines(&theme, tables.iter().map(|table| (&*table.stamps_ns, &*table.columns[INFORMED])));
-        let readout = Readout { key, lines: &lines, factor: 1.0, unit: "", whole: true, principal: &|value| value };
+        let readout = Readout { key, lines: &lines, factor: 1.0, unit: "", whole: true };
         plot_ui(ui, ctx, &area, &plot, &readout).on_hover_text(window::RANKS_OVER_TIME.meaning);
     }
 }

@@ -299,7 +299,7 @@ impl Profile<'_> {
             means.iter().map(|(_, mean)| mean.mean_px.abs() + 2.0 * mean.error_px).fold(0.0, f64::max)
         };
         let high = (1.1 * reach(&window).max(reach(&flight))).max(0.02);
-        let area = PlotArea { rect: plot, begin_ns: 0, end_ns: 1, low: -high, high };
+        let area = PlotArea { rect: plot, begin_ns: 0, end_ns: 1, low: -high, high, middle: None };
         paint_ground(&painter, theme, plot);
         paint_value_axis(&painter, theme, &area, 1.0);
         let x = |fraction: f64| plot.left() + fraction as f32 * plot.width();

@@ -173,7 +173,7 @@ impl ResidualsPanel {
         let (_, outer) = ui.allocate_space(vec2(ui.available_width(), height));
         let rect = within_gutters(outer, TIME_GUTTER);
         let (begin_ns, end_ns) = visible_range(ctx);
-        let mut area = PlotArea { rect, begin_ns, end_ns, low: 0.0, high: 1.0 };
+        let mut area = PlotArea { rect, begin_ns, end_ns, low: 0.0, high: 1.0, middle: None };
         let tables = self.tables.read(&ctx.recording.runs, |step| [rms_px(&step.report)]);
         self.curves.resize_with(tables.len(), Curve::default);
         for (table, curve) in tables.iter().zip(&mut self.curves) {
@@ -198,7 +198,7 @@ impl ResidualsPanel {
         let wheel = Wheel::in_list(self.overflows);
         let plot = Interaction { id, name: key, value: &value, clicks: Clicks::Seek, wheel };
         let lines = read_lines(&theme, tables.iter().map(|table| (&*table.stamps_ns, &*table.columns[0])));
-        let readout = Readout { key, lines: &lines, factor: 1.0, unit: " px", whole: false, principal: &|value| value };
+        let readout = Readout { key, lines: &lines, factor: 1.0, unit: " px", whole: false };
         plot_ui(ui, ctx, &area, &plot, &readout)
             .on_hover_text("Reprojection RMS after the solve, px (reprojection_rms_after_px in frames.csv)");
     }

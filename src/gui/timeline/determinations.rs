@@ -181,7 +181,7 @@ mod tests {
         let answer = crate::session::Answer::of_run(&recording, run);
         let whole = tables.report(&context, &recording, run, &answer).history;
         let rect = Rect::from_min_max(pos2(50.0, 10.0), pos2(850.0, 250.0));
-        let area = PlotArea { rect, begin_ns: 0, end_ns: recording.last_stamp_ns(), low: 0.0, high: 1.0 };
+        let area = PlotArea { rect, begin_ns: 0, end_ns: recording.last_stamp_ns(), low: 0.0, high: 1.0, middle: None };
         let mut map = LevelMap::default();
         map.update(&area, run.id, &whole);
         assert_eq!(map.rows.len(), whole.parameters.len());

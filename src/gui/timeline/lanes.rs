@@ -240,12 +240,7 @@ pub(super) fn read_values(painter: &Painter, ctx: &PanelContext<'_>, lane: Lane,
     let Some(column) = lane.column() else { return };
     let lines = read_lines(ctx.theme, runs.iter().map(|lanes| (&*lanes.stamps_ns, &*lanes.columns[column])));
     let (unit, whole) = if lane == Lane::Reprojection { (" px", false) } else { ("", true) };
-    paint_values(
-        painter,
-        ctx,
-        area,
-        &Readout { key: "", lines: &lines, factor: 1.0, unit, whole, principal: &|it| it },
-    );
+    paint_values(painter, ctx, area, &Readout { key: "", lines: &lines, factor: 1.0, unit, whole });
 }
 
 /// Draws hits of breakpoints: filled for enabled ones, in the colour of the run and in its section of the lane.
@@ -342,7 +337,7 @@ mod tests {
     #[test]
     fn a_lane_paints_at_most_one_symbol_per_column() {
         let rect = Rect::from_min_max(pos2(0.0, 0.0), pos2(100.0, 20.0));
-        let area = PlotArea { rect, begin_ns: 0, end_ns: 12_000, low: 0.0, high: 1.0 };
+        let area = PlotArea { rect, begin_ns: 0, end_ns: 12_000, low: 0.0, high: 1.0, middle: None };
         let counts: Vec<(i64, usize)> = (0..12_000).map(|row| (row, if row == 4321 { 40 } else { 3 })).collect();
         let columns = highest_by_column(&area, &counts);
         assert!(columns.len() <= 101 && columns.is_sorted_by(|a, b| a.0.floor() < b.0.floor()));

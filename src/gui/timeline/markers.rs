@@ -78,7 +78,7 @@ mod tests {
     #[test]
     fn names_end_before_the_next_marker_and_the_nearest_one_is_under_the_pointer() {
         let rect = Rect::from_min_max(pos2(100.0, 0.0), pos2(1100.0, 200.0));
-        let area = PlotArea { rect, begin_ns: 0, end_ns: 1000, low: 0.0, high: 1.0 };
+        let area = PlotArea { rect, begin_ns: 0, end_ns: 1000, low: 0.0, high: 1.0, middle: None };
         let markers =
             Markers::new([(100, "a"), (104, "b"), (500, "c"), (2000, "d")].map(|(at, it)| Marker::new(at, it)).into());
         let shown = shown(&area, &markers);

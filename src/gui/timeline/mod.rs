@@ -78,7 +78,7 @@ impl Panel for TimelinePanel {
         // The lanes fill the available space, so that the panel around them keeps its height.
         ui.advance_cursor_after_rect(rect);
         let (begin_ns, end_ns) = visible_range(ctx);
-        let area = PlotArea { rect: plot, begin_ns, end_ns, low: 0.0, high: 1.0 };
+        let area = PlotArea { rect: plot, begin_ns, end_ns, low: 0.0, high: 1.0, middle: None };
         let theme = *ctx.theme;
         let painter = ui.painter_at(rect);
         paint_ruler(&painter, ctx, &area);

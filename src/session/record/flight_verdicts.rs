@@ -23,6 +23,8 @@ const MIN_EFFECT_RATIO: f64 = 0.98;
 pub struct FlightVerdicts {
     required: RequiredAccuracy,
     parameters: BTreeMap<ParameterId, Followed>,
+    /// Values at the first step of each parameter, angles in (−π, π].
+    starts: BTreeMap<ParameterId, f64>,
     redundancy: Redundancy,
     last: Option<Arc<StepRecord>>,
     /// Last step with a rank report.
@@ -106,6 +108,10 @@ impl FlightVerdicts {
             }
             parameters.insert(parameter, followed);
         }
+        let calibration = &step.report.calibration;
+        for (parameter, value) in calibration.parameters.iter().zip(&calibration.values) {
+            self.starts.entry(*parameter).or_insert_with(|| parameter.principal_value(*value));
+        }
         self.parameters = parameters;
         self.last = Some(Arc::clone(step));
     }
@@ -144,7 +150,9 @@ impl FlightVerdicts {
                 name: names.name(*parameter),
                 group: parameter.group().name(),
                 dimension: parameter.dimension(),
-                value: parameter.principal_value(calibration.values.get(index).copied().unwrap_or(f64::NAN)),
+                value: self.starts.get(parameter).copied().map_or(f64::NAN, |start| {
+                    parameter.value_near(start, calibration.values.get(index).copied().unwrap_or(f64::NAN))
+                }),
                 sigma,
                 prior_sigma,
                 ratio: sigma.zip(prior_sigma).map(|(sigma, prior_sigma)| sigma / prior_sigma),

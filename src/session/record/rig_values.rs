@@ -41,6 +41,18 @@ impl RunRecord {
         Some(values)
     }
 
+    /// Value of a parameter at the start of the run, angles in (−π, π]; `None` if it is not estimated there.
+    pub fn start_value(&self, parameter: ParameterId) -> Option<f64> {
+        let start = self.steps.first()?.report.calibration.value_of(parameter)?;
+        Some(parameter.principal_value(start))
+    }
+
+    /// Value of a parameter as tables, plots and files show it: an angle is the one nearest to that at the start.
+    pub fn shown_value(&self, parameter: ParameterId, value: f64) -> f64 {
+        self.start_value(parameter)
+            .map_or_else(|| parameter.principal_value(value), |start| parameter.value_near(start, value))
+    }
+
     /// The rig of the run's prior with the final calibration of the run.
     pub fn calibrated_rig(&self, given: &Rig) -> Rig {
         let mut rig = given.clone();

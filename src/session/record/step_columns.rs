@@ -109,7 +109,11 @@ impl RunRecord {
         let names = rig.parameter_names();
         self.parameters().into_iter().map(move |parameter| {
             let (name, unit) = (names.name(parameter), parameter.dimension().unit());
-            let value = move |step: &StepRecord| step.report.calibration.value_of(parameter);
+            let start = self.start_value(parameter);
+            let value = move |step: &StepRecord| {
+                let value = step.report.calibration.value_of(parameter)?;
+                Some(start.map_or(value, |start| parameter.value_near(start, value)))
+            };
             let sigma = move |step: &StepRecord| step.report.calibration.sigma_of(parameter);
             let sigma_name = format!("{name}_sigma_{unit}");
             (parameter, [StepColumn::new(format!("{name}_{unit}"), value), StepColumn::new(sigma_name, sigma)])

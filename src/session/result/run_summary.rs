@@ -252,12 +252,13 @@ fn calibration(recording: &Recording, run: &RunRecord, answer: &Answer) -> Calib
         .map(|(index, parameter)| {
             let parameter = *parameter;
             let dimension = parameter.dimension();
-            let value = parameter.principal_value(last.values[index]);
-            let ground_truth = value_of(&true_values, parameter);
+            let value = run.shown_value(parameter, last.values[index]);
+            let near = |other: f64| parameter.value_near(value, other);
+            let ground_truth = value_of(&true_values, parameter).map(near);
             ParameterSummary {
                 name: names.name(parameter),
                 dimension,
-                initial: value_of(&initial_values, parameter).unwrap_or(value),
+                initial: value_of(&initial_values, parameter).map_or(value, near),
                 last: value,
                 sigma: last.sigmas.get(index).copied().filter(|sigma| sigma.is_finite()),
                 ground_truth,

@@ -206,7 +206,7 @@ fn area_of(motion: &MotionSplines, limits: &MotionLimits, channel: usize, rect: 
     let values = || samples(motion).map(|time_s| motion.value(channel, time_s, 0));
     let (least, most) = (values().fold(low, f64::min), values().fold(high, f64::max));
     let end_ns = ns_from_seconds(motion.duration_s());
-    PlotArea { rect, begin_ns: 0, end_ns, low: 0.0, high: 1.0 }.with_values(least - margin, most + margin)
+    PlotArea { rect, begin_ns: 0, end_ns, low: 0.0, high: 1.0, middle: None }.with_values(least - margin, most + margin)
 }
 
 fn samples(motion: &MotionSplines) -> impl Iterator<Item = f64> {

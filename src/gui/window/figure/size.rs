@@ -7,7 +7,7 @@ use crate::gui::{PanelName, Presentation};
 use crate::session::Recording;
 
 /// Width and height of a plot in the convergence figure, in points.
-const PLOT: [f32; 2] = [180.0, 77.0];
+const PLOT: [f32; 2] = [180.0, 91.0];
 /// Height of the convergence figure without its plots: its legend.
 const CONVERGENCE: f32 = 56.0;
 /// Heights of the rank figure without its rows, and of a row.
