@@ -3,7 +3,7 @@
 use egui::{ViewportBuilder, ViewportInfo, pos2};
 use serde::{Deserialize, Serialize};
 
-/// Size of the window at the first start, in logical pixels.
+/// Size of the window in logical pixels before the first change; at the first start it is maximized.
 const FIRST_SIZE: [f32; 2] = [1600.0, 900.0];
 /// Minimum size in logical pixels.
 const MIN_SIZE: [f32; 2] = [640.0, 400.0];
@@ -51,7 +51,7 @@ pub(super) struct WindowPlace {
 
 impl Default for WindowPlace {
     fn default() -> Self {
-        Self { position: None, size: FIRST_SIZE, maximized: false }
+        Self { position: None, size: FIRST_SIZE, maximized: true }
     }
 }
 

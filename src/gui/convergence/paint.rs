@@ -264,7 +264,7 @@ pub(super) fn cell_ui(
     let row = history.row_at(ctx.cursor_ns);
     let verdict = data.verdicts.verdict(id, data.verdicts.row_at(ctx.cursor_ns));
     let value = row.map(|row| (parameter.values[row], parameter.sigmas[row]));
-    title(&painter, ctx, rect, name, shown, value, verdict, selected);
+    title(&painter, ctx, rect, name, shown, value, (verdict, !has_note), selected);
     let error =
         value.zip(ground_truth).map(|((value, sigma), ground_truth)| (id.principal_value(value - ground_truth), sigma));
     if has_note {
@@ -385,7 +385,8 @@ fn paint_verdicts(painter: &Painter, theme: &Theme, area: &PlotArea, curves: &Pa
     }
 }
 
-/// Draws the name on the left, value and σ on the right as far as they fit.
+/// Draws the name on the left, with the mark of a verdict that has no line of its own, and value and σ on the right as far
+/// as they fit.
 #[expect(clippy::too_many_arguments, reason = "one line of text has that many inputs")]
 fn title(
     painter: &Painter,
@@ -394,12 +395,17 @@ fn title(
     name: &str,
     shown: Shown,
     value: Option<(f64, f64)>,
-    verdict: Determination,
+    (verdict, marks_verdict): (Determination, bool),
     selected: bool,
 ) {
     let theme = ctx.theme;
     let name_color = if selected { theme.accent } else { theme.text_strong };
-    let end = painter.text(rect.left_top(), Align2::LEFT_TOP, name, theme::label_font(), name_color).right();
+    let mut end = painter.text(rect.left_top(), Align2::LEFT_TOP, name, theme::label_font(), name_color).right();
+    if marks_verdict && MARKED.contains(&verdict) {
+        let (mark, color) = look_of(verdict, theme);
+        let place = pos2(end + 4.0, rect.top());
+        end = painter.text(place, Align2::LEFT_TOP, mark, theme::label_font(), color).right();
+    }
     let Some((value, sigma)) = value else { return };
     let color = if verdict.is_met() { theme.text_strong } else { theme.text_weak };
     let font = theme::number_font();

@@ -46,6 +46,55 @@ fn runs(count: usize) -> Recording {
     recording
 }
 
+/// Height of the timeline.
+fn timeline_height(harness: &Harness<'static, Bench>) -> f32 {
+    let places = &harness.state().window.tiles.places;
+    places.iter().find(|(panel, _)| *panel == PanelName::Timeline).map_or(0.0, |(_, rect)| rect.height())
+}
+
+#[test]
+fn timeline_and_panels_follow_the_size_of_the_window() {
+    let sizes = [[800.0, 600.0], SMALL, [1920.0, 1080.0], [3840.0, 2160.0]];
+    let settled = |size: [f32; 2]| {
+        let mut harness = bench_of(runs(2), size);
+        harness.run_steps(4);
+        harness
+    };
+    let heights = sizes.map(|size| timeline_height(&settled(size)));
+    assert!(heights[0] > 140.0 && heights[2] > 190.0, "{heights:?}");
+    for [from, to] in [[0, 2], [2, 0], [3, 1], [1, 3]] {
+        let mut harness = settled(sizes[from]);
+        harness.set_size(sizes[to].into());
+        harness.run_steps(4);
+        assert_eq!(timeline_height(&harness), heights[to], "from {:?} to {:?}", sizes[from], sizes[to]);
+        let fresh = settled(sizes[to]);
+        assert_eq!(harness.state().window.tiles.places, fresh.state().window.tiles.places);
+    }
+}
+
+#[test]
+fn a_timeline_that_was_dragged_keeps_its_part_of_the_window_until_a_layout_is_chosen() {
+    let mut harness = bench_of(runs(2), SMALL);
+    harness.run_steps(4);
+    let before = timeline_height(&harness);
+    let edge = egui::pos2(500.0, SMALL[1] - 22.0 - before);
+    harness.drag_at(edge);
+    harness.run_steps(2);
+    harness.hover_at(edge - egui::vec2(0.0, 100.0));
+    harness.run_steps(2);
+    harness.drop_at(edge - egui::vec2(0.0, 100.0));
+    harness.run_steps(3);
+    let dragged = timeline_height(&harness);
+    assert!((dragged - before - 100.0).abs() < 12.0, "{before} {dragged}");
+    harness.set_size(egui::vec2(2732.0, 1536.0));
+    harness.run_steps(4);
+    assert!(timeline_height(&harness) > 1.9 * dragged, "{dragged} {}", timeline_height(&harness));
+    harness.set_size(SMALL.into());
+    harness.key_press(Key::Num1);
+    harness.run_steps(4);
+    assert_eq!(timeline_height(&harness), before);
+}
+
 #[test]
 fn a_small_screen_shows_whole_texts_in_every_layout() {
     for count in [1, 2] {

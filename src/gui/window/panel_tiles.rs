@@ -22,6 +22,9 @@ pub struct PanelTiles {
     pub(super) focus: Option<PanelName>,
     /// Height of timeline and status bar in the last frame.
     pub(super) below_height: Option<f32>,
+    /// Height that the timeline was given by hand, without and with the rows of the parameters, as a ratio of the room
+    /// below the bars; `None` follows its lanes.
+    pub(super) timeline_ratios: [Option<f32>; 2],
     /// The rectangles of the panels on the screen, in the order of drawing.
     pub(super) places: Vec<(PanelName, Rect)>,
 }
@@ -105,7 +108,9 @@ impl PanelTiles {
         }
     }
 
+    /// Arranges the panels as in a preset, and the timeline as at the start.
     pub fn arrange(&mut self, preset: Preset) {
+        self.timeline_ratios = [None; 2];
         self.layout.arrange(preset);
     }
 

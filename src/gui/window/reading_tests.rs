@@ -162,19 +162,16 @@ fn the_name_of_a_reading_cursor_does_not_cover_a_verdict() {
     };
     let free = verdicts(&harness);
     assert!(!free.is_empty());
-    let mut moved = 0;
-    for tenths in 0..40 {
+    for tenths in (0..40).step_by(4) {
         harness.state_mut().selection.reading.set_cursor(ReadingCursor::B, tenths * SECOND_NS / 10);
         harness.run_steps(2);
         let shown = verdicts(&harness);
-        assert_eq!(shown.len(), free.len());
+        assert_eq!(shown, free, "verdicts are beside the plots and do not move");
         for painted in painted_texts(&harness).iter().filter(|painted| painted.text() == "B") {
             let name = painted.rect();
             assert!(shown.iter().all(|verdict| !verdict.intersects(name.shrink(1.0))), "{tenths}: {name:?} {shown:?}");
         }
-        moved += usize::from(shown != free);
     }
-    assert!((1..40).contains(&moved), "a verdict moves only where the name would cover it: {moved}");
 }
 
 #[test]

@@ -17,8 +17,8 @@ pub(crate) struct PanelLayout {
     maximized: Option<PanelName>,
     /// Preset that was chosen last; `None` for a saved layout.
     pub(crate) preset: Option<Preset>,
-    /// True if the preset is still to be arranged for the size of the window.
-    unsized_preset: bool,
+    /// True if the preset was arranged for a large window; `None` before it was shown, and for a saved layout.
+    large: Option<bool>,
 }
 
 /// Size in points of all panels from which the overview has the convergence plots beside the calibration table.
@@ -40,7 +40,7 @@ impl Default for PanelLayout {
 
 impl PanelLayout {
     fn of(preset: Preset) -> Self {
-        Self { tree: tree_of(preset, false), maximized: None, preset: Some(preset), unsized_preset: true }
+        Self { tree: tree_of(preset, false), maximized: None, preset: Some(preset), large: None }
     }
 
     /// Arranges the panels as in a preset, with all panels visible.
@@ -50,7 +50,7 @@ impl PanelLayout {
 
     /// Applies a saved layout.
     pub(crate) fn take(&mut self, tree: Tree<PanelName>) {
-        *self = Self { tree, maximized: None, preset: None, unsized_preset: false };
+        *self = Self { tree, maximized: None, preset: None, large: None };
     }
 
     pub(crate) fn tree(&self) -> &Tree<PanelName> {
@@ -70,16 +70,17 @@ impl PanelLayout {
     /// True if another layout has the same panels in the same places, with other tabs in front or another panel
     /// maximized.
     pub(crate) fn differs_by_open_tabs_only(&self, other: &Self) -> bool {
-        let without_open_tabs = |layout: &Self| {
-            let mut tree = layout.tree.clone();
-            for (_, tile) in tree.tiles.iter_mut() {
-                if let Tile::Container(Container::Tabs(tabs)) = tile {
-                    tabs.active = None;
-                }
-            }
-            tree
-        };
-        self != other && self.preset == other.preset && without_open_tabs(self) == without_open_tabs(other)
+        self != other && self.preset == other.preset && without_open_tabs(&self.tree) == without_open_tabs(&other.tree)
+    }
+
+    /// Arranges a preset for the size of the window, unless its panels were moved by hand.
+    fn follow_size(&mut self, room: Vec2) {
+        let Some(preset) = self.preset else { return };
+        let large = room.x >= LARGE.x && room.y >= LARGE.y;
+        let Some(before) = self.large.replace(large).or(Some(false)).filter(|before| *before != large) else { return };
+        if without_open_tabs(&self.tree) == without_open_tabs(&tree_of(preset, before)) {
+            self.tree = tree_of(preset, large);
+        }
     }
 
     pub(crate) fn is_visible(&self, pane: PanelName) -> bool {
@@ -114,13 +115,7 @@ impl PanelLayout {
         focus: Option<PanelName>,
         places: &mut Vec<(PanelName, Rect)>,
     ) -> TabClicks {
-        let room = ui.available_size();
-        if let (true, Some(preset)) = (std::mem::take(&mut self.unsized_preset), self.preset)
-            && room.x >= LARGE.x
-            && room.y >= LARGE.y
-        {
-            self.tree = tree_of(preset, true);
-        }
+        self.follow_size(ui.available_size());
         let mut alone = self.maximized.map(tree_of_one);
         let drawn = alone.as_mut().unwrap_or(&mut self.tree);
         let tree = TreeIds { id: drawn.id(), root: drawn.root() };
@@ -137,6 +132,17 @@ impl PanelLayout {
         }
         clicks
     }
+}
+
+/// The same panels in the same places, without the tabs that are in front.
+fn without_open_tabs(tree: &Tree<PanelName>) -> Tree<PanelName> {
+    let mut tree = tree.clone();
+    for (_, tile) in tree.tiles.iter_mut() {
+        if let Tile::Container(Container::Tabs(tabs)) = tile {
+            tabs.active = None;
+        }
+    }
+    tree
 }
 
 /// Clicks on the tab bars in a frame.
