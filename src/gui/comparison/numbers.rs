@@ -44,6 +44,10 @@ pub(super) fn accuracy_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, scores: &Scor
     if ctx.recording.truth_is_batch {
         ui.label(RichText::new(AGAINST_BATCH).color(theme.text_weak));
     }
+    if scores.is_unfinished() {
+        let text = "Runs are still computed: values of different lengths are not compared";
+        ui.label(RichText::new(text).color(theme.text_weak));
+    }
     let grid = Grid::new("accuracy").striped(true).min_row_height(ROW_HEIGHT).spacing(vec2(14.0, 2.0));
     grid.show(ui, |ui| {
         ui.label("");

@@ -35,6 +35,8 @@ fn error_of_mean(errors: &[f64]) -> Option<f64> {
 #[derive(Debug, Default)]
 struct RunScore {
     id: u64,
+    /// Key of its main camera; empty for a trajectory of another program.
+    camera: String,
     count: usize,
     finished: bool,
     accuracy: Option<TrajectoryAccuracy>,
@@ -131,6 +133,11 @@ impl Scores {
         }
     }
 
+    /// True if values are missing of a run that is still computed.
+    pub(super) fn is_unfinished(&self) -> bool {
+        self.runs.iter().any(|score| !score.finished)
+    }
+
     pub(crate) fn rows(&self) -> Vec<ScoreRow> {
         const ATE: &str = "Absolute trajectory error: distance to the ground truth after alignment in yaw and position, over the estimated frames";
         const RPE: &str = "Relative pose error against the ground truth over sub-trajectories of this path length";
@@ -210,12 +217,18 @@ impl Scores {
         rows
     }
 
-    /// Sets the scatter of errors; they are not comparable if the runs have estimated different numbers of frames.
+    /// Sets the scatter of values, and which are comparable: none while a run is computed, no errors of runs that have
+    /// estimated different numbers of frames, and no extrinsics of different cameras.
     fn add_scatter(&self, row: &mut ScoreRow) {
         let counts = || self.runs.iter().filter_map(|score| score.estimated);
         let (fewest, most) = (counts().min().unwrap_or(0), counts().max().unwrap_or(0));
         let of_trajectory = matches!(row.kind, ScoreKind::Absolute | ScoreKind::Relative(_));
         if of_trajectory && (most - fewest) as f64 > MAX_FRAME_RATIO * most as f64 {
+            row.less_is_better = None;
+        }
+        let valued = || self.runs.iter().zip(&row.values).filter(|(_, value)| value.is_some()).map(|(score, _)| score);
+        let of_one_camera = valued().zip(valued().skip(1)).all(|(a, b)| a.camera == b.camera);
+        if self.is_unfinished() || row.kind == ScoreKind::Extrinsics && !of_one_camera {
             row.less_is_better = None;
         }
         let ratio = |score: &RunScore| match row.kind {
@@ -243,6 +256,7 @@ impl RunScore {
         let first = run.steps.iter().find(tracking);
         Self {
             id: run.id,
+            camera: run.camera_key.clone(),
             count: run.steps.len(),
             finished: run.finished,
             accuracy: run.accuracy().ok(),
@@ -278,7 +292,7 @@ mod tests {
     use super::*;
 
     fn score(estimated: usize, accuracy: Option<TrajectoryAccuracy>, ate_scatter_m: Option<f64>) -> RunScore {
-        RunScore { estimated: Some(estimated), accuracy, ate_scatter_m, ..RunScore::default() }
+        RunScore { estimated: Some(estimated), accuracy, ate_scatter_m, finished: true, ..RunScore::default() }
     }
 
     fn accuracy(ate_m: f64) -> TrajectoryAccuracy {
@@ -298,6 +312,30 @@ mod tests {
         assert_eq!(best([0.100, 0.150], 0.01, [400, 400]), Some(0));
         assert_eq!(best([0.100, 0.110], 0.01, [400, 400]), None, "within the scatter");
         assert_eq!(best([0.100, 0.150], 0.01, [400, 300]), None, "one has skipped a part of the flight");
+    }
+
+    #[test]
+    fn only_finished_runs_are_compared_and_extrinsics_of_one_camera() {
+        let best = |name: &str, finished: bool, cameras: [&str; 2]| {
+            let runs = [0, 1].map(|run| RunScore {
+                finished: finished || run == 0,
+                camera: cameras[run].to_owned(),
+                chain: Some(ChainDistance {
+                    translation_mean_m: [0.001, 0.002][run],
+                    rotation_mean_rad: 0.001,
+                    translation_std_m: 0.0,
+                    rotation_std_rad: 0.0,
+                }),
+                ..score(400, Some(accuracy([0.1, 0.2][run])), Some(0.01))
+            });
+            let rows = Scores { runs: runs.into() }.rows();
+            rows.iter().find(|row| row.name == name).unwrap().best()
+        };
+        let extrinsics = "extrinsics error, mean";
+        assert_eq!(best("ATE RMS", true, ["cam0", "cam1"]), Some(0));
+        assert_eq!(best("ATE RMS", false, ["cam0", "cam0"]), None, "a run is still computed");
+        assert_eq!(best(extrinsics, true, ["cam0", "cam0"]), Some(0));
+        assert_eq!(best(extrinsics, true, ["cam0", "cam1"]), None, "other cameras");
     }
 
     #[test]

@@ -26,6 +26,8 @@ const CHANGES_SHOWN: usize = 4;
 #[derive(Debug, Default)]
 pub(super) struct SliderUi {
     playing: bool,
+    /// True if the chain was moved in the last frame.
+    moved: bool,
 }
 
 impl SliderUi {
@@ -35,6 +37,8 @@ impl SliderUi {
         let Some(chain) = chain_of_step(&step.report, rank) else { return };
         let mut directions = SlideDirection::of_step(rank);
         let position = ctx.selection.slide;
+        // A reset elsewhere ends the animation.
+        self.playing &= !(self.moved && position.is_none());
         directions.extend(position.iter().map(|position| position.direction).filter(|it| is_other(it, rank)));
         let selected = ctx.selection.parameter.map(SlideDirection::Parameter).into_iter();
         directions.extend(selected.filter(|it| is_other(it, rank)));
@@ -112,6 +116,7 @@ impl SliderUi {
         let untouched = ctx.selection.slide.is_none() && amount == 0.0 && !self.playing;
         let unchosen = SlideDirection::of_step(rank).first() == Some(&direction);
         ctx.selection.slide = (!(untouched && unchosen)).then_some(SlidePosition { direction, amount });
+        self.moved = ctx.selection.slide.is_some();
         if let Some(slide) = ctx.moved_chain(step.report.stamp_ns) {
             outcome_ui(ui, ctx, slide, &parameters);
         }

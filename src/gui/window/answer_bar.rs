@@ -36,6 +36,7 @@ pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, actions: &mut Vec<Acti
         if let Some(progress) = &ctx.playback.diagnosis {
             progress_ui(ui, ctx.commands, progress, &theme);
         }
+        moved_chain_ui(ui, ctx);
         let motion = if pending.is_none() { ctx.motion(ui, run) } else { None };
         if let Some(motion) = &motion {
             motion_ui(ui, ctx, motion);
@@ -129,6 +130,18 @@ fn motion_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, motion: &SufficientMotion)
 }
 
 /// Draws the buttons of the first finding, from right to left.
+/// Says that the chain of the run is shown moved, with a button that moves it back.
+fn moved_chain_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>) {
+    if ctx.selection.slide.is_none_or(|slide| slide.amount == 0.0) {
+        return;
+    }
+    let text = RichText::new("Chain moved: reset").color(ctx.theme.warn);
+    let hint = "Scene and image show the chain moved along a direction of the rank panel; a click shows the estimate";
+    if ui.button(text).on_hover_text(hint).clicked() {
+        ctx.selection.slide = None;
+    }
+}
+
 fn buttons_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, answer: &Answer, actions: &mut Vec<Action>) {
     let Some(first) = answer.findings.first() else { return };
     let is_running = ctx.playback.diagnosis.is_some();

@@ -531,6 +531,13 @@ fn the_chain_slides_from_the_rank_panel() {
     harness.key_press(Key::Escape);
     harness.run_steps(2);
     assert_eq!(harness.state().selection.slide, None);
+    // The bar of the answer names the moved chain whatever panels are open, and moves it back.
+    assert!(harness.query_by_label("Chain moved: reset").is_none());
+    harness.get_by_label("Animate the direction").click();
+    harness.run_steps(4);
+    harness.get_by_label("Chain moved: reset").click();
+    harness.run_steps(4);
+    assert_eq!(harness.state().selection.slide, None, "the animation ends, too");
 }
 
 #[test]
