@@ -11,7 +11,7 @@ mod tests;
 
 use std::sync::Arc;
 
-use egui::{Pos2, Rect, Role, Sense, Ui, Vec2, WidgetInfo, vec2};
+use egui::{Label, Pos2, Rect, RichText, Role, Sense, Ui, Vec2, WidgetInfo, vec2};
 
 use self::model::JacobianModel;
 pub(super) use self::model::{cameras, column_name, name_of};
@@ -27,13 +27,13 @@ use crate::table::{Column, csv};
 /// Maximum magnification of the matrix.
 const MAX_ZOOM: f32 = 40.0;
 /// Width of the row names on the left in points.
-const ROW_NAMES: f32 = 104.0;
+const ROW_NAMES: f32 = 118.0;
 /// Height of the legend below the matrix in points.
 const LEGEND: f32 = 18.0;
 /// Panel height in points from which the values of the selected block are shown, and the fraction of the height that
 /// they take.
 const MIN_HEIGHT_WITH_DETAILS: f32 = 300.0;
-const DETAILS_RATIO: f32 = 0.3;
+const DETAILS_RATIO: f32 = 0.26;
 /// Height in points of the line about a row or a column.
 const DETAILS_LINE: f32 = 34.0;
 
@@ -108,13 +108,15 @@ impl JacobianPanel {
         let height = ui.available_height();
         let selected_block = self.selected_block(ctx, model);
         let with_details = height >= MIN_HEIGHT_WITH_DETAILS;
-        // The room follows the selection, which this step may lack.
+        // In the window the matrix keeps its height, so that no block moves under the pointer; in a figure the room follows
+        // the selection, which this step may lack.
         let wanted = [
             self.row.is_some() || ctx.selection.feature.is_some(),
             self.column.is_some() || ctx.selection.parameter.is_some(),
         ];
         let below = match wanted {
             _ if !with_details => 0.0,
+            _ if !ctx.presentation.is_figure() => DETAILS_RATIO * height,
             [true, true] => DETAILS_RATIO * height,
             [false, false] => 0.0,
             _ => DETAILS_LINE,
@@ -159,6 +161,9 @@ impl JacobianPanel {
                 factors::request(ctx, run, run.index_at(ctx.cursor_ns), model.jacobian.rows[row].factor);
             }
             details::ui(ui, ctx, run, step, model, selected_block);
+        } else if with_details && !ctx.presentation.is_figure() {
+            let text = "Click a block: its rows, residuals and derivatives, and the feature or parameter in all panels";
+            ui.add(Label::new(RichText::new(text).color(ctx.theme.text_weak)).wrap());
         }
     }
 

@@ -118,6 +118,7 @@ fn a_click_selects_feature_and_parameter_and_shows_their_values() {
     click(&mut harness, at);
     let selection = &harness.state().1;
     assert_eq!((selection.feature, selection.parameter), (Some(id), Some(parameter("L2.alpha"))));
+    assert_eq!(middle(&harness, 3, column), at, "the block stays under the pointer");
     assert!(harness.query_by_label_contains(&format!("feature {} × roll.alpha: ", id.0)).is_some());
     assert!(harness.query_by_label("∂u, px/°").is_some());
     // A parameter selected in another panel is shown as a column, with the rows of the largest norms.

@@ -205,7 +205,6 @@ fn above_panels_ui(
     state.notices.list_ui(ui, ctx);
     tour::ui(ui, &mut state.tour, &mut state.tiles, &state.panels.rank, ctx);
     state.help.ui(ui, &theme, &state.tiles.places);
-    state.notices.toasts_ui(ui, &theme);
     state.ring.ui(ui, &theme);
     let MainWindow { tiles, notices, dialogs, help, menu, .. } = &mut *state;
     context_menu::ui(ui, menu, ctx, clicks.menu, MenuParts { tiles, notices, dialogs, help, actions });

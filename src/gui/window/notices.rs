@@ -1,4 +1,5 @@
-//! Messages for the user: toasts, a banner for stopped runs, a list of all warnings.
+//! Messages for the user: a line in the status bar, toasts where there is none, a banner for stopped runs, a list of all
+//! warnings.
 
 use std::collections::VecDeque;
 
@@ -76,22 +77,66 @@ impl Notices {
         self.show_message(NoticeLevel::Info, text);
     }
 
-    /// Shows the message of a success, or the problem.
+    /// Shows the message of a success, after which earlier problems are of no interest any more, or the problem.
     pub fn report(&mut self, result: Result<String, String>) {
         match result {
-            Ok(text) => self.inform(text),
+            Ok(text) => {
+                self.toasts.clear();
+                self.inform(text);
+            }
             Err(problem) => self.show_message(NoticeLevel::Error, problem),
         }
     }
 
-    /// Draws the messages above the status bar, where they cover no verdict.
-    pub(crate) fn toasts_ui(&mut self, ui: &Ui, theme: &Theme) {
+    /// Removes the messages whose time is over; returns true if there are others.
+    fn has_current(&mut self, ui: &Ui) -> bool {
         let now_s = ui.input(|input| input.time);
         for toast in &mut self.toasts {
             toast.since_s.get_or_insert(now_s);
         }
         self.toasts.retain(|toast| toast.since_s.is_none_or(|since_s| now_s - since_s < toast.level.shown_s()));
-        if self.toasts.is_empty() {
+        if !self.toasts.is_empty() {
+            ui.ctx().request_repaint_after(std::time::Duration::from_secs(1));
+        }
+        !self.toasts.is_empty()
+    }
+
+    /// A message is not taken away while it is read.
+    fn hold(&mut self, ui: &Ui) {
+        let now_s = ui.input(|input| input.time);
+        for toast in &mut self.toasts {
+            toast.since_s = Some(now_s);
+        }
+    }
+
+    /// Draws the newest message from right to left in a line of the status bar, where it covers nothing, with the number of
+    /// the others; a click on it opens the list.
+    pub(super) fn line_ui(&mut self, ui: &mut Ui, theme: &Theme) {
+        if self.list_open || !self.has_current(ui) {
+            return;
+        }
+        let Some(Toast { level, text, .. }) = self.toasts.last() else { return };
+        let (mark, color) = level.look(theme);
+        let close = ui.add(Button::new("x").small());
+        close.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, "Dismiss notice"));
+        let others = self.toasts.len() - 1;
+        let more = if others > 0 { format!(" (+{others})") } else { String::new() };
+        let line = RichText::new(format!("{mark} {text}{more}")).color(color);
+        let label = ui.add(egui::Label::new(line).truncate().sense(egui::Sense::click()));
+        label.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, text));
+        let label = label.on_hover_text(text.as_str());
+        if close.clicked() {
+            self.toasts.pop();
+        } else if label.clicked() {
+            self.list_open = true;
+        } else if label.hovered() {
+            self.hold(ui);
+        }
+    }
+
+    /// Draws the messages low in a window without a status bar.
+    pub(crate) fn toasts_ui(&mut self, ui: &Ui, theme: &Theme) {
+        if !self.has_current(ui) {
             return;
         }
         let mut dismissed = None;
@@ -117,15 +162,14 @@ impl Notices {
         if let Some(number) = dismissed {
             self.toasts.remove(number);
         }
-        // A message is not taken away while it is read.
         if shown.response.contains_pointer() {
-            for toast in &mut self.toasts {
-                toast.since_s = Some(now_s);
-            }
+            self.hold(ui);
         }
-        if !self.toasts.is_empty() {
-            ui.ctx().request_repaint_after(std::time::Duration::from_secs(1));
-        }
+    }
+
+    /// True if a message is to be shown.
+    pub(super) fn is_shown(&self) -> bool {
+        !self.list_open && !self.toasts.is_empty()
     }
 
     /// Draws the list of warnings about the log and its runs; a click on a stamp moves the cursor there.

@@ -18,6 +18,8 @@ const RIGHT_WIDTH: f32 = 110.0;
 const PROGRESS_WIDTH: f32 = 160.0;
 const OPENING_WIDTH: f32 = 240.0;
 
+/// Width in points that a message has at least.
+const NOTICE_WIDTH: f32 = 260.0;
 /// Number of steps over which the real-time factor is averaged.
 const STEPS_OF_MEAN: usize = 100;
 
@@ -96,7 +98,8 @@ pub(super) fn ui(
         let reserved = RIGHT_WIDTH
             + if status.progress.is_some() { PROGRESS_WIDTH + 5.0 } else { 0.0 }
             + if status.opening.is_some() { OPENING_WIDTH } else { 0.0 };
-        fields_ui(ui, &theme, fields, ui.available_width() - reserved);
+        let room = ui.available_width() - reserved;
+        fields_ui(ui, &theme, fields, if notices.is_shown() { room - NOTICE_WIDTH } else { room });
         ui.with_layout(UiLayout::right_to_left(Align::Center), |ui| {
             let (text, color) = if count == 0 {
                 ("No warnings".to_owned(), theme.text_weak)
@@ -119,6 +122,7 @@ pub(super) fn ui(
             {
                 requests.push(WindowRequest::CancelOpening);
             }
+            notices.line_ui(ui, &theme);
         });
     });
 }
