@@ -8,13 +8,12 @@ use dcvins::session::{self, BreakpointHit, Computation, Recording, RunRecord, Se
 use crate::cli::terminal::Progress;
 
 /// Runs the estimators of a plan to the end of the log, or to a stamp.
-pub(crate) fn compute(plan: &SessionPlan, until_ns: Option<i64>) -> Result<Computation> {
+pub(crate) fn compute(plan: &SessionPlan) -> Result<Computation> {
     let begin_s = plan.start_s;
     let log_end_s = seconds_from_ns(plan.log.duration_ns());
     let end_s = plan.duration_s.map_or(log_end_s, |duration_s| log_end_s.min(begin_s + duration_s));
-    let end_s = until_ns.map_or(end_s, |until_ns| end_s.min(seconds_from_ns(until_ns)));
     let progress = Progress::new();
-    let computation = session::compute(plan, until_ns, &mut |recording| {
+    let computation = session::compute(plan, &mut |recording| {
         let (pass, now_s) = progress_of(recording);
         progress.show((now_s - begin_s) / (end_s - begin_s).max(1e-3), || format!("{pass}{now_s:.1} of {end_s:.1} s"));
     })?;

@@ -29,7 +29,7 @@ pub(crate) fn diagnose(arguments: &DiagnoseArguments) -> Result<ExitOutcome> {
     let plan = SessionPlan::open(&arguments.estimation.request(arguments.log.clone())?)?;
     let interrupt = Interrupt::watch()?;
     let plan = SessionPlan { interrupted: interrupt.flag(), ..plan };
-    let computation = compute(&plan, None)?;
+    let computation = compute(&plan)?;
     if computation.recording().runs.iter().all(|run| run.steps.is_empty()) && !interrupt.is_set() {
         bail!("no image of the log could be used; reasons: 'dcvins check {}'", arguments.log.display());
     }

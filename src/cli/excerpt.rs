@@ -100,7 +100,7 @@ fn computed(
     interrupt: &Interrupt,
 ) -> Result<Option<(Recording, Option<FlightPrior>, SessionPlan)>> {
     let plan = SessionPlan { interrupted: interrupt.flag(), ..SessionPlan::open(request)? };
-    let recording = compute(&plan, None)?.into_recording();
+    let recording = compute(&plan)?.into_recording();
     if interrupt.is_set() {
         notify("dcvins: interrupted");
         return Ok(None);

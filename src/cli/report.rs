@@ -73,7 +73,7 @@ pub(crate) fn report(arguments: &ReportArguments) -> Result<ExitOutcome> {
     }
     let plan = SessionPlan { interrupted: interrupt.flag(), ..plan.clone() };
     let (computed, checked) = beside_check(&plan, &arguments.cache, || {
-        let mut computation = compute(&plan, None)?;
+        let mut computation = compute(&plan)?;
         if interrupt.is_set() && computation.recording().runs.iter().all(|run| run.steps.is_empty()) {
             return Ok(None);
         }

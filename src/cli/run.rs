@@ -79,7 +79,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitOutcome> {
     let plan = SessionPlan { interrupted: interrupt.flag(), memory_budget_bytes, ..plan.clone() };
     let estimate = || match &arguments.break_at {
         Some(condition) => compute_until(&plan, condition),
-        None => Ok((compute(&plan, None)?.into_recording(), None)),
+        None => Ok((compute(&plan)?.into_recording(), None)),
     };
     let (recording, hit) = if arguments.no_check {
         estimate()?

@@ -15,8 +15,8 @@ use dcvins::gui::app::PlayingLog;
 use dcvins::gui::theme::ThemeName;
 use dcvins::gui::window::{FigureFormat, FigureInput, Preset};
 use dcvins::gui::{ImageSource, PanelName, Playback, Presentation};
-use dcvins::observability::SlideRequest;
-use dcvins::session::{Computation, Session, SessionPlan};
+use dcvins::observability::{SlidePosition, SlideRequest};
+use dcvins::session::{Computation, Recording, Session, SessionPlan};
 use dcvins::simulation::PrescribedMotion;
 use dcvins::sweep::{OpenedStudy, is_study};
 use dcvins::text::{Named as _, log_name};
@@ -203,20 +203,11 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<ExitOutcome>
         write_known(&files, &paths, arguments.csv)?;
         return Ok(ExitOutcome::Success);
     }
-    let mut computation =
-        shown.compute(instants.last_ns, &interrupt, (arguments.panel == "all").then_some(&arguments.cache))?;
+    let mut computation = shown.compute(&interrupt, (arguments.panel == "all").then_some(&arguments.cache))?;
     if interrupt.is_set() {
         return stopped(0);
     }
-    let names = computation.recording().rig.parameter_names();
-    let position = |request: &SlideRequest| {
-        let known = || {
-            let direction = &request.direction;
-            format!("unknown direction '{direction}': expected a number, a name such as base-d, or a parameter")
-        };
-        request.position(&names).with_context(known)
-    };
-    let slide = arguments.slide.as_ref().map(position).transpose()?;
+    let slide = slide_position(arguments, computation.recording())?;
     let playback = shown.playback();
     let run = arguments.figure.run(computation.recording())?;
     let cameras = arguments.figure.cameras(computation.recording())?;
@@ -239,24 +230,11 @@ pub(crate) fn screenshot(arguments: &ScreenshotArguments) -> Result<ExitOutcome>
         computation.fill_in(cursor_ns);
         let recording = computation.recording();
         let path = path_at(cursor_ns);
-        let panel = &arguments.panel;
         let at_ns = (!instants.is_assumed).then_some(cursor_ns);
-        let screenshot = match format {
-            _ if is_of_paper => {
-                let spec = arguments.figure.spec(panel, options.theme, at_ns, recording)?;
-                let input = FigureInput::new(recording, shown.images(), &options.playback, slide);
-                figure_bytes(&spec, format.of_figure(), &own_command_line(), input)?
-            }
-            FormatArgument::Png => png_bytes(&draw_panel(panel, recording, cursor_ns, shown.images(), &options)?)?,
-            FormatArgument::Svg | FormatArgument::Pdf => {
-                let time_s = seconds_from_ns(cursor_ns);
-                let title = format!("{panel} of {} at {time_s:.3} s", log_name(&recording.log_path));
-                draw_panel_svg(panel, recording, cursor_ns, shown.images(), &options, ["clip", &title])?.into_bytes()
-            }
-        };
-        let mut written = vec![(path.clone(), screenshot)];
+        let drawn = draw(arguments, format, recording, shown.images(), &options, (cursor_ns, at_ns))?;
+        let mut written = vec![(path.clone(), drawn)];
         if arguments.csv {
-            let table = panel_csv(panel, recording, cursor_ns, shown.images(), &options)?;
+            let table = panel_csv(&arguments.panel, recording, cursor_ns, shown.images(), &options)?;
             written.push((path.with_extension("csv"), table.into_bytes()));
         }
         for (path, content) in written {
@@ -296,8 +274,6 @@ struct Instants {
     stamps_ns: Vec<i64>,
     /// True without `--at` and `--every`: the end of the range, or of what is computed.
     is_assumed: bool,
-    /// End of the steps that the screenshots need: plots of a range need those to its end.
-    last_ns: i64,
 }
 
 impl Instants {
@@ -325,10 +301,44 @@ impl Instants {
         }
         stamps_ns.sort_unstable();
         stamps_ns.dedup();
-        let last_stamp_ns = stamps_ns.last().copied().unwrap_or(end_ns);
-        let last_ns = range_end_ns.map_or(last_stamp_ns, |to_ns| last_stamp_ns.max(to_ns));
-        Ok(Self { stamps_ns, is_assumed, last_ns })
+        Ok(Self { stamps_ns, is_assumed })
     }
+}
+
+/// Direction and distance of --slide.
+fn slide_position(arguments: &ScreenshotArguments, recording: &Recording) -> Result<Option<SlidePosition>> {
+    let Some(request) = &arguments.slide else { return Ok(None) };
+    let position = request.position(&recording.rig.parameter_names());
+    let position = position.with_context(|| {
+        let direction = &request.direction;
+        format!("unknown direction '{direction}': expected a number, a name such as base-d, or a parameter")
+    })?;
+    Ok(Some(position))
+}
+
+/// Draws the panel at a position of the cursor into a file of a format; the second stamp is the one of --at or --every.
+fn draw(
+    arguments: &ScreenshotArguments,
+    format: FormatArgument,
+    recording: &Recording,
+    images: &mut dyn ImageSource,
+    options: &ScreenshotOptions,
+    (cursor_ns, at_ns): (i64, Option<i64>),
+) -> Result<Vec<u8>> {
+    let panel = &arguments.panel;
+    if arguments.is_of_paper(format) {
+        let spec = arguments.figure.spec(panel, options.theme, at_ns, recording)?;
+        let input = FigureInput::new(recording, images, &options.playback, options.slide);
+        return Ok(figure_bytes(&spec, format.of_figure(), &own_command_line(), input)?);
+    }
+    Ok(match format {
+        FormatArgument::Png => png_bytes(&draw_panel(panel, recording, cursor_ns, images, options)?)?,
+        FormatArgument::Svg | FormatArgument::Pdf => {
+            let time_s = seconds_from_ns(cursor_ns);
+            let title = format!("{panel} of {} at {time_s:.3} s", log_name(&recording.log_path));
+            draw_panel_svg(panel, recording, cursor_ns, images, options, ["clip", &title])?.into_bytes()
+        }
+    })
 }
 
 /// Size, theme and renderer.
@@ -470,19 +480,14 @@ impl Shown {
         )
     }
 
-    /// Computes the runs up to a stamp; runs of a saved session are computed to their end. For the whole window, the log is
-    /// checked as well.
-    fn compute(
-        &mut self,
-        until_ns: i64,
-        interrupt: &Interrupt,
-        checked_with: Option<&CacheArguments>,
-    ) -> Result<Computation> {
+    /// Computes the runs to their end, as the window does, so that its panels have the same values. For the whole window,
+    /// the log is checked as well.
+    fn compute(&mut self, interrupt: &Interrupt, checked_with: Option<&CacheArguments>) -> Result<Computation> {
         match &mut self.source {
             Source::Log(plan, _) => {
                 plan.interrupted = interrupt.flag();
-                let Some(cache) = checked_with else { return compute(plan, Some(until_ns)) };
-                let (computed, checked) = beside_check(plan, cache, || compute(plan, Some(until_ns)));
+                let Some(cache) = checked_with else { return compute(plan) };
+                let (computed, checked) = beside_check(plan, cache, || compute(plan));
                 let mut computation = computed?;
                 computation.set_check(checked);
                 Ok(computation)

@@ -143,7 +143,7 @@ mod window {
         let stem = plan.log_path.file_stem().unwrap_or(plan.log_path.as_os_str());
         let folder = out.map_or_else(|| Path::new("dcvins-output").join(stem), Path::to_path_buf);
         notify(&format!("dcvins: there is no display, so screenshots are written to {}", folder.display()));
-        let mut computation = compute(plan, None)?;
+        let mut computation = compute(plan)?;
         computation.fill_in(computation.recording().last_stamp_ns());
         let recording = computation.into_recording();
         let mut images = ImageReader::new(Arc::clone(&plan.log), &plan.rig);

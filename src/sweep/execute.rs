@@ -124,7 +124,7 @@ impl StudyFolder {
         })?;
         plan.keep_linearization_every = Some(CONSISTENCY_EVERY);
         plan.memory_budget_bytes = RECORD_BYTES;
-        let recording = session::compute(&plan, None, &mut |_| ())?.into_recording();
+        let recording = session::compute(&plan, &mut |_| ())?.into_recording();
         plan.log.require_unshortened()?;
         let run = recording.runs.first().ok_or_else(|| JobError::NoImage(files.log.clone()))?;
         if let Some(error) = &run.error {

@@ -279,13 +279,13 @@ struct Sample {
     playback: Playback,
 }
 
-/// Sample log, computed once up to the cursor of the screenshots.
+/// Sample log, computed once.
 fn sample() -> Sample {
     let specs = RUNS.map(|spec| spec.parse().expect("the specifications of tests are valid"));
     let log_path = root().join("sample_logs/garden.mcap");
     let request = SessionRequest { log_path, specs: specs.into(), ..SessionRequest::default() };
     let plan = SessionPlan::open(&request).expect("the sample log opens");
-    let computation = session::compute(&plan, Some(ns_from_seconds(AT_S)), &mut |_| {});
+    let computation = session::compute(&plan, &mut |_| {});
     let recording = computation.expect("the sample log is computed").into_recording();
     let mut breakpoints = Breakpoints::default();
     for condition in BREAKPOINTS {

@@ -67,8 +67,7 @@ fn cpu_and_graphics_adapter_draw_the_same_panels() {
     let request = SessionRequest { log_path: sample_log(), ..SessionRequest::default() };
     let plan = SessionPlan::open(&request).expect("the sample log opens");
     let cursor_ns = ns_from_seconds(5.0);
-    let recording =
-        session::compute(&plan, Some(cursor_ns), &mut |_| {}).expect("the sample log is computed").into_recording();
+    let recording = session::compute(&plan, &mut |_| {}).expect("the sample log is computed").into_recording();
     let mut images = ImageReader::new(Arc::clone(&plan.log), &plan.rig);
     let mut draw = |panel: &str, renderer, options: ScreenshotOptions| {
         let options = ScreenshotOptions { renderer, ..options };

@@ -45,7 +45,7 @@ fn a_screenshot_of_the_same_command_is_the_same_and_another_one_is_not() {
     assert!(third.2.contains("damaged entry"), "{}", third.2);
     assert_eq!((&third.0, &third.1), (&first.0, &first.1));
     assert_eq!(draw("fourth.png", &["--at", "0.5"]), first);
-    assert_ne!(draw("other.png", &["--at", "0.8"]).1, first.1);
+    assert!(draw("other.png", &["--at", "0.8"]).0 != first.0, "the cursor is at another time");
     assert_eq!(entries(&cache).len(), 2);
     draw("none.png", &["--at", "0.3", "--no-cache"]);
     assert_eq!(entries(&cache).len(), 2);

@@ -29,7 +29,7 @@ fn bits(record: &StepRecord) -> String {
 
 /// Runs without a memory limit, computed from start to end.
 fn straight(specs: &[&str]) -> Computation {
-    let computation = session::compute(&plan(specs, usize::MAX), None, &mut |_| {}).expect("the runs start");
+    let computation = session::compute(&plan(specs, usize::MAX), &mut |_| {}).expect("the runs start");
     assert!(computation.recording().runs.iter().all(|run| run.error.is_none() && run.memory.summaries == 0));
     computation
 }
@@ -104,7 +104,7 @@ fn stepping_back_shows_what_was_seen_on_the_way_forward_with_little_memory() {
 
 #[test]
 fn summaries_hold_everything_that_is_plotted_over_time() {
-    let summaries = session::compute(&plan(&["auto"], 0), None, &mut |_| {});
+    let summaries = session::compute(&plan(&["auto"], 0), &mut |_| {});
     let (whole, summaries) = (straight_auto().recording(), summaries.expect("the runs start").into_recording());
     assert!(summaries.runs[0].memory.summaries > 90);
     for (whole, kept) in whole.runs[0].steps.iter().zip(&summaries.runs[0].steps) {
@@ -177,7 +177,7 @@ fn screenshots_of_any_instant_have_the_same_bytes_with_little_memory() {
 
     let whole = straight(&["auto", "classical"]).into_recording();
     let plan = plan(&["auto", "classical"], 0);
-    let mut little = session::compute(&plan, None, &mut |_| {}).expect("the runs start");
+    let mut little = session::compute(&plan, &mut |_| {}).expect("the runs start");
     let stamps_ns: Vec<i64> = [16, 81, 100].map(|step| whole.runs[0].steps[step].report.stamp_ns).to_vec();
     let summary_only = |stamp_ns: i64| {
         little.recording().runs.iter().all(|run| run.step_at(stamp_ns).is_some_and(|step| step.summary_only))

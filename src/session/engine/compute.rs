@@ -1,4 +1,4 @@
-//! Computation of runs to their end or to a stamp; blocks until done.
+//! Computation of runs to their end or to a condition; blocks until done.
 
 use std::sync::atomic::Ordering;
 
@@ -60,27 +60,17 @@ pub fn compute_until(
 }
 
 /// Computes every run of the plan and returns the reports. `on_step` is called after each step.
-///
-/// With `until_ns` the computation ends when every run has passed that stamp (for a screenshot of one frame).
-pub fn compute(
-    plan: &SessionPlan,
-    until_ns: Option<i64>,
-    on_step: &mut dyn FnMut(&Recording),
-) -> Result<Computation, SessionError> {
+pub fn compute(plan: &SessionPlan, on_step: &mut dyn FnMut(&Recording)) -> Result<Computation, SessionError> {
     let mut computation = Computation::new(plan);
     let mut engine = Engine::start(plan, &computation)?;
     engine.no_more_runs();
     while let Some(message) = engine.receive() {
-        computation.apply(ended_at(message, until_ns.unwrap_or(i64::MAX)));
+        computation.apply(message);
         on_step(computation.recording());
         let interrupted = plan.interrupted.load(Ordering::Relaxed);
         if interrupted || computation.recording().runs.iter().all(|run| run.finished) {
             break;
         }
-    }
-    if let Some(until_ns) = until_ns {
-        // The threads may be ahead by the length of their queues.
-        computation.recording_mut().warnings.retain(|warning| warning.stamp_ns <= until_ns);
     }
     Ok(computation)
 }
