@@ -225,21 +225,18 @@ pub(super) fn cell_ui(
     let has_note = rect.height() - below >= MIN_HEIGHT_WITH_NOTE;
     let above = TITLE_HEIGHT + if has_note { NOTE_HEIGHT } else { 0.0 };
     let plot = within_gutters(rect.with_min_y(rect.top() + above), below);
-    let mut area = PlotArea { rect: plot, begin_ns, end_ns, low: 0.0, high: 1.0, middle: None };
+    let area = PlotArea { rect: plot, begin_ns, end_ns, low: 0.0, high: 1.0, middle: None };
 
     let overlaid: Vec<usize> = (0..data.histories.len()).filter(|run| data.values(*run, id).is_some()).collect();
     data.update_curves(curves, &area, id, parameter, &overlaid);
     let curve_of = |run: usize| curves.get(&(run, id));
     let ground_truth = data.ground_truth.get(&id).map(|truth| parameter.unwrap_near(id, *truth));
-    let extent_of = |run: usize| curve_of(run)?.value.extent;
-    let others = overlaid.iter().filter(|run| **run != shown_run).filter_map(|run| extent_of(*run));
-    let (automatic, middle) = value_range(extent_of(shown_run), ground_truth, others, parameter);
     let key = format!("convergence {name}");
-    let (low, high) = value_range_of(ctx, &key, automatic.0, automatic.1);
-    area = area.with_values(low, high);
-    if let Some(middle) = middle.filter(|_| (low, high) == automatic) {
-        area = area.broken(middle);
-    }
+    let area = {
+        let extent_of = |run: usize| curve_of(run)?.value.extent;
+        let others = overlaid.iter().filter(|run| **run != shown_run).filter_map(|run| extent_of(*run));
+        with_range(ctx, &key, area, value_range(extent_of(shown_run), ground_truth, others, parameter))
+    };
 
     let painter = ui.painter_at(rect.expand(1.0));
     let inner = painter.with_clip_rect(plot);
@@ -306,6 +303,21 @@ pub(super) fn cell_ui(
         lines.extend(data.others_lines(ctx, &overlaid, id, shown, &area));
         ui.label(lines.join("\n"));
     });
+}
+
+/// The plot with the range that was set by hand, else the automatic one with its broken scale.
+fn with_range(
+    ctx: &PanelContext<'_>,
+    key: &str,
+    area: PlotArea,
+    (automatic, middle): ((f64, f64), Option<[f64; 2]>),
+) -> PlotArea {
+    let (low, high) = value_range_of(ctx, key, automatic.0, automatic.1);
+    let area = area.with_values(low, high);
+    match middle.filter(|_| (low, high) == automatic) {
+        Some(middle) => area.broken(middle),
+        None => area,
+    }
 }
 
 /// Curves of all runs: the shown run last, on top; marks for those outside the plot.

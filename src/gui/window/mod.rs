@@ -41,12 +41,13 @@ mod status_bar;
 #[cfg(test)]
 mod tests;
 mod tiles;
+mod timeline_height;
 mod top_bar;
 mod tour;
 
 use std::sync::Arc;
 
-use egui::{CentralPanel, Frame, Margin, Rangef, Rect, Ui, UiBuilder, vec2};
+use egui::{CentralPanel, Frame, Margin, Rect, Ui, UiBuilder, vec2};
 
 use self::actions::Action;
 use self::context_menu::MenuParts;
@@ -73,17 +74,10 @@ pub use self::state::MainWindow;
 pub use self::status_bar::AppStatus;
 pub use self::tiles::Preset;
 use self::tiles::TabClicks;
+use self::timeline_height::TimelineHeight;
 use super::help;
 use super::plot::plot_under_pointer;
 use super::{Panel as _, PanelContext, PanelName};
-
-/// Height of the status bar in points.
-const STATUS_HEIGHT: f32 = 22.0;
-/// Smallest height of the timeline in points, and the smallest that it has by itself: legible lanes of one run.
-const MIN_TIMELINE_HEIGHT: f32 = 60.0;
-const MIN_LANES_HEIGHT: f32 = 150.0;
-/// Largest height of the timeline as a ratio of the room below the bars.
-const MOST_TIMELINE: f32 = 0.8;
 
 /// Draws the window for a session.
 pub fn window_ui(ui: &mut Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>) {
@@ -114,21 +108,8 @@ pub fn window_ui(ui: &mut Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>
     }
 
     // The panels are drawn before the timeline below them, because the Tab key follows the order of drawing.
-    let open = state.panels.timeline.has_open_parameters();
-    let many = ctx.recording.runs.len() + ctx.recording.trajectories.len() > 2;
-    let most = if open {
-        0.5
-    } else if many {
-        0.3
-    } else {
-        0.25
-    };
-    let room = (ui.available_height() - STATUS_HEIGHT).max(MIN_TIMELINE_HEIGHT);
-    let by_hand = state.tiles.timeline_ratios[usize::from(open)].map(|ratio| ratio * room);
-    let of_lanes = state.panels.timeline.wanted_height(ui, ctx);
-    let wanted = by_hand.unwrap_or_else(|| of_lanes.min((most * room).max(MIN_LANES_HEIGHT)));
-    let wanted = wanted.min(MOST_TIMELINE * room).max(MIN_TIMELINE_HEIGHT).round();
-    let below = state.tiles.below_height.unwrap_or(wanted + STATUS_HEIGHT);
+    let height = TimelineHeight::of(ui, state, ctx);
+    let below = state.tiles.below_height.unwrap_or(height.wanted + status_bar::HEIGHT);
     let rest = ui.available_rect_before_wrap();
     let above = rest.with_max_y((rest.bottom() - below).max(rest.top()));
     let mut clicks = TabClicks::default();
@@ -142,29 +123,17 @@ pub fn window_ui(ui: &mut Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>
 
     // The status bar is laid out first, because it is the lowest.
     let status = Frame::new().fill(theme.surface).inner_margin(Margin::symmetric(8, 2));
-    let status = egui::Panel::bottom("status bar").exact_size(STATUS_HEIGHT).frame(status);
+    let status = egui::Panel::bottom("status bar").exact_size(status_bar::HEIGHT).frame(status);
     let status = status.show(ui, |ui| ui.max_rect());
     let frame = Frame::new().fill(theme.surface).inner_margin(Margin::symmetric(6, 4));
-    // The height follows the window except while its edge is dragged.
-    let pressed = ui.input(|input| input.pointer.any_down());
-    let range = if pressed {
-        Rangef::new(MIN_TIMELINE_HEIGHT, (MOST_TIMELINE * room).max(MIN_TIMELINE_HEIGHT))
-    } else {
-        Rangef::point(wanted)
-    };
-    let name = if open { "timeline with parameters" } else { "timeline" };
-    let timeline = egui::Panel::bottom(name).resizable(true).default_size(wanted).size_range(range).frame(frame);
-    let timeline = timeline.show(ui, |ui| {
+    let timeline = height.panel().frame(frame).show(ui, |ui| {
         let corner = ui.max_rect().right_top() + vec2(-24.0, 2.0);
         state.panels.timeline.ui(ui, ctx);
         let place = UiBuilder::new().max_rect(Rect::from_min_size(corner, vec2(20.0, 18.0)));
         let pressed = ui.scope_builder(place, |ui| help::button_ui(ui, &theme, PanelName::Timeline)).inner;
         clicks.asked = pressed.then_some(PanelName::Timeline).or(clicks.asked);
     });
-    let height = timeline.response.rect.height();
-    if pressed && (height - wanted).abs() > 1.0 {
-        state.tiles.timeline_ratios[usize::from(open)] = Some(height / room);
-    }
+    height.follow(&mut state.tiles.timeline_ratios, timeline.response.rect.height());
     state.tiles.places.push((PanelName::Timeline, timeline.response.rect));
     ui.scope_builder(UiBuilder::new().max_rect(status.inner), |ui| {
         status_bar::ui(ui, &state.status, ctx, &mut state.notices, &mut state.requests);

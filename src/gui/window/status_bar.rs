@@ -13,6 +13,8 @@ use crate::gui::{PanelContext, ReadingCursor};
 use crate::session::warning_lines;
 use crate::session::{Recording, RunRecord};
 
+/// Height of the bar in points.
+pub(super) const HEIGHT: f32 = 22.0;
 /// Widths in points of the warnings, of the progress, and of the log that is being opened.
 const RIGHT_WIDTH: f32 = 110.0;
 const PROGRESS_WIDTH: f32 = 160.0;

@@ -30,7 +30,7 @@ use crate::flight_log::messages::frame_and_checksum;
 use crate::flight_log::stream::angle_fit::{self, FittedAngle};
 use crate::flight_log::{FlightLog, messages, messages::MessageKind};
 use crate::geometry::{ns_from_seconds, seconds_from_ns, wrap_angle};
-use crate::sensors::{AttitudeSource, GimbalRig, ImuRig, ImuSample, JointSample, Rig};
+use crate::sensors::{AttitudeSource, GimbalRig, ImuRig, ImuSample, Joint, JointSample, Rig};
 
 /// Maximum number of listed joint names; messages may name more.
 const JOINT_NAMES: usize = 64;
@@ -321,26 +321,11 @@ impl Survey {
         }
         let encoders = rig.gimbal.as_ref().filter(|gimbal| gimbal.attitude.is_none());
         if let Some(gimbal) = encoders.filter(|gimbal| gimbal.topic.as_deref() == Some(topic)) {
-            match messages::read_joint_state(data) {
-                Ok(message) if message.lacks_positions() => match message.content_without_positions() {
-                    Some(content) => entry.without_positions.get_or_insert((0, content)).0 += 1,
-                    None => entry.refuse(message.length_problem()),
-                },
-                Ok(message) => {
-                    let angle = |name: &str| {
-                        let place = message.names.iter().position(|known| *known == name)?;
-                        message.positions_rad.get(place).copied()
-                    };
-                    let angles_rad = gimbal.joints.iter().map(|joint| angle(&joint.name)).collect();
-                    self.joints.push(JointReading { stamp_ns, angles_rad });
-                    for name in &message.names {
-                        let room = self.joint_names.len() < JOINT_NAMES;
-                        if room && !self.joint_names.iter().any(|known| known == name) {
-                            self.joint_names.push((*name).to_owned());
-                        }
-                    }
-                }
-                Err(error) => entry.refuse(error.to_string()),
+            let taken = (&mut self.joints, &mut self.joint_names);
+            match take_joint_state(taken, &gimbal.joints, stamp_ns, data) {
+                Ok(None) => {}
+                Ok(Some(content)) => entry.without_positions.get_or_insert((0, content)).0 += 1,
+                Err(problem) => entry.refuse(problem),
             }
         }
         let is_read = place.is_sampled || place.is_grouped;
@@ -383,6 +368,31 @@ fn take_gimbal_imu(
         forces.push((stamp_ns, sensor.intrinsics.correct_specific_force(&force)));
     }
     Ok(())
+}
+
+/// Adds a message of joint states to the readings of the rig's joints, and its names to those known; returns what a
+/// message without positions has.
+fn take_joint_state(
+    (readings, known_names): (&mut Vec<JointReading>, &mut Vec<String>),
+    joints: &[Joint],
+    stamp_ns: i64,
+    data: &[u8],
+) -> Result<Option<&'static str>, String> {
+    let message = messages::read_joint_state(data).map_err(|error| error.to_string())?;
+    if message.lacks_positions() {
+        return message.content_without_positions().map(Some).ok_or_else(|| message.length_problem());
+    }
+    let angle = |name: &str| {
+        let place = message.names.iter().position(|known| *known == name)?;
+        message.positions_rad.get(place).copied()
+    };
+    readings.push(JointReading { stamp_ns, angles_rad: joints.iter().map(|joint| angle(&joint.name)).collect() });
+    for name in &message.names {
+        if known_names.len() < JOINT_NAMES && !known_names.iter().any(|known| known == name) {
+            known_names.push((*name).to_owned());
+        }
+    }
+    Ok(None)
 }
 
 /// True for a reading that can be an angle in radians, with whole revolutions.
