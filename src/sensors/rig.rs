@@ -113,6 +113,14 @@ impl CameraRig {
         self.mount == CameraMount::Gimbal
     }
 
+    /// Pose of this camera in a frame in which the first camera with its mount has a pose.
+    pub fn beside(&self, first: RigidTransform) -> RigidTransform {
+        match self.relative_prior {
+            None => first,
+            Some(_) => first * self.first_from_camera,
+        }
+    }
+
     /// Time in seconds from an image's stamp to the exposure of a row (0 is the centre of the first one), in camera
     /// time: `row / height · readout`.
     pub fn row_time_s(&self, row_px: f64) -> f64 {
@@ -302,14 +310,9 @@ impl Rig {
         let camera = self.cameras.iter().find(|camera| camera.key == key)?;
         match &camera.mount {
             CameraMount::Gimbal => self.gimbal.as_ref().map(|gimbal| {
-                let chain = &gimbal.chain;
                 // The chain ends at the first camera.
-                if camera.relative_prior.is_some() {
-                    let effector_from_camera = chain.effector_from_camera * camera.first_from_camera;
-                    ClassicalChain { effector_from_camera, ..chain.clone() }
-                } else {
-                    chain.clone()
-                }
+                let effector_from_camera = camera.beside(gimbal.chain.effector_from_camera);
+                ClassicalChain { effector_from_camera, ..gimbal.chain.clone() }
             }),
             CameraMount::Static { imu_from_camera } => {
                 Some(ClassicalChain { imu_from_base: *imu_from_camera, ..ClassicalChain::default() })
@@ -457,11 +460,7 @@ impl Rig {
         }
         let imu_from_camera = gimbal.chain.imu_from_camera(angles_rad);
         for camera in rig.cameras.iter_mut().filter(|camera| camera.mount == CameraMount::Gimbal) {
-            let imu_from_camera = match camera.relative_prior {
-                None => imu_from_camera,
-                Some(_) => imu_from_camera * camera.first_from_camera,
-            };
-            camera.mount = CameraMount::Static { imu_from_camera };
+            camera.mount = CameraMount::Static { imu_from_camera: camera.beside(imu_from_camera) };
             camera.first_from_camera = RigidTransform::identity();
         }
         rig.assumed.retain(|assumed| !assumed.field.starts_with("gimbal"));

@@ -98,11 +98,7 @@ impl Scenario {
         match (&camera.mount, &self.true_rig.gimbal, &self.joints) {
             (CameraMount::Static { imu_from_camera }, ..) => world_from_imu * *imu_from_camera,
             (CameraMount::Gimbal, Some(gimbal), Some(joints)) => {
-                let world_from_first = world_from_imu * gimbal.chain.imu_from_camera(&joints.at(time_s));
-                match camera.relative_prior {
-                    None => world_from_first,
-                    Some(_) => world_from_first * camera.first_from_camera,
-                }
+                camera.beside(world_from_imu * gimbal.chain.imu_from_camera(&joints.at(time_s)))
             }
             (CameraMount::Gimbal, ..) => world_from_imu,
         }
