@@ -106,6 +106,10 @@ impl BreakpointsPanel {
         ui.horizontal(|ui| {
             let mut enabled = breakpoint.enabled;
             let name = RichText::new(text).monospace().color(theme.text_strong);
+            // The buttons come first, so that they stay in the panel whatever its width and the number of runs.
+            if !ctx.presentation.is_figure() {
+                self.buttons_ui(ui, ctx, number, text);
+            }
             if ctx.presentation.is_figure() {
                 ui.label(name);
                 if !enabled {
@@ -117,28 +121,31 @@ impl BreakpointsPanel {
                     ctx.commands.push(Command::EnableBreakpoint { number, enabled });
                 }
             }
+        });
+        ui.horizontal_wrapped(|ui| {
             for (run, record) in ctx.recording.runs.iter().enumerate() {
                 let hits = counted(breakpoint.hit_count(record), "hit");
                 let text = RichText::new(format!("{} {hits}", record.spec.label)).small().color(theme.run(run).color);
                 ui.label(text).on_hover_text("Number of times that the condition became true in this run");
             }
-            if ctx.presentation.is_figure() {
-                return;
-            }
-            let small = |ui: &mut Ui, sign: &str, name: String| {
-                let button = ui.add(Button::new(sign).small());
-                button.widget_info(|| WidgetInfo::labeled(egui::Role::Button, true, &name));
-                button.on_hover_text(name.clone()).clicked()
-            };
-            if small(ui, "edit", format!("Edit {text}")) {
-                text.clone_into(&mut self.typed);
-                self.changing = Some(number);
-            }
-            if small(ui, "x", format!("Remove {text}")) {
-                ctx.commands.push(Command::RemoveBreakpoint(number));
-                self.changing = None;
-            }
         });
+    }
+
+    /// Buttons that change and remove a breakpoint with the text of its condition.
+    fn buttons_ui(&mut self, ui: &mut Ui, ctx: &mut PanelContext<'_>, number: usize, text: &str) {
+        let small = |ui: &mut Ui, sign: &str, name: String| {
+            let button = ui.add(Button::new(sign).small());
+            button.widget_info(|| WidgetInfo::labeled(egui::Role::Button, true, &name));
+            button.on_hover_text(name.clone()).clicked()
+        };
+        if small(ui, "edit", format!("Edit {text}")) {
+            text.clone_into(&mut self.typed);
+            self.changing = Some(number);
+        }
+        if small(ui, "x", format!("Remove {text}")) {
+            ctx.commands.push(Command::RemoveBreakpoint(number));
+            self.changing = None;
+        }
     }
 }
 

@@ -210,7 +210,7 @@ pub(crate) mod window {
         DURATION: "duration" => "Time from the first to the last message of the log, s.";
         FRAME: "frame" => "Number of the image at the cursor in its camera's stream, from 0.";
         COST: "cost" => "Half the sum of all squared whitened residuals before and after the shown solver iteration. No unit.";
-        CONVERGENCE: "convergence" => "Estimate ± posterior σ at the cursor, from the window and all priors. Band: ±3σ; Δ: estimate minus ground truth. Shaded parts of a value axis are compressed, so that the last band is visible.";
+        CONVERGENCE: "convergence" => "Estimate ± posterior σ at the cursor, from the window and all priors. Band: ±3σ; Δ: estimate minus ground truth; shaded ends of an axis are compressed.";
         CAPTION: "caption" => "Frame number, stamp, features tracked, new, lost, rejected (front end and solve) and sliding, and the RMS and median of the reprojection residuals in px over all observations of the window.";
         CHAIN_ROW: "chain table" => "Denavit–Hartenberg parameters of the estimated chain at the cursor: joint angle q, offset θ₀ and twist α in degrees, d and a in mm.";
         CHAIN_FRAMES: "chain frames" => "Frames of the chain: I IMU, B base, J2, J3 … after each joint, E end effector, C camera. Axes x red, y green, z blue; dashed: ground truth.";

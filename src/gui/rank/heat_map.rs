@@ -26,7 +26,7 @@ const NOTE_HEIGHT: f32 = 16.0;
 /// Number of rows shown whatever the height of the panel.
 const MIN_ROWS: usize = 3;
 /// Minimum width of a column with signed numbers in points.
-const NUMBER_WIDTH: f32 = 37.0;
+const NUMBER_WIDTH: f32 = 48.0;
 /// Minimum width in points of a column whose singular value fits between its neighbours.
 const HEAD_WIDTH: f32 = 44.0;
 const MAX_COLUMN_WIDTH: f32 = 84.0;
