@@ -239,7 +239,7 @@ pub(in crate::session) fn cameras_of_run<'rig>(
 }
 
 /// Names the cameras of a cluster of all cameras, if it cannot use others; returns a warning for each of those.
-fn name_usable_cameras(log: &Arc<FlightLog>, rig: &Rig, spec: &mut RunSpec) -> Vec<LogWarning> {
+pub(in crate::session) fn name_usable_cameras(log: &Arc<FlightLog>, rig: &Rig, spec: &mut RunSpec) -> Vec<LogWarning> {
     if spec.parameterization != ParameterizationChoice::Cluster || !spec.cluster_keys.is_empty() {
         return Vec::new();
     }

@@ -5,7 +5,9 @@ use std::sync::Arc;
 use super::session::Session;
 use crate::geometry::seconds_from_ns;
 use crate::session::engine::{Computation, History, apply_fork};
-use crate::session::plan::{ForkChanges, ForkError, MAX_RUNS, RunSpec, SessionError, cameras_of_run, distinct_label};
+use crate::session::plan::{
+    ForkChanges, ForkError, MAX_RUNS, RunSpec, SessionError, cameras_of_run, distinct_label, name_usable_cameras,
+};
 use crate::session::record::RunRecord;
 
 impl Session {
@@ -17,13 +19,17 @@ impl Session {
 
     fn try_add_run(&mut self, spec: RunSpec) -> Result<(), SessionError> {
         self.check_run_count()?;
-        let spec = self.distinct(spec);
+        let mut spec = self.distinct(spec);
+        let warnings = name_usable_cameras(&self.plan.log, &self.plan.rig, &mut spec);
         let camera_key = cameras_of_run(&self.plan.rig, &spec)?.main.key.clone();
         self.plan.runs.push((spec.clone(), camera_key.clone()));
         let history = Arc::new(History::new(self.plan.memory_budget_bytes));
         let truth = self.recording().position_truth.clone();
         let run = RunRecord::new(spec, camera_key).with_position_truth(truth);
-        self.shared.change(|computation| computation.add_run(run, history));
+        self.shared.change(|computation| {
+            computation.add_run(run, history);
+            computation.recording_mut().add_warnings(warnings);
+        });
         self.engine.start_runs(&self.plan, &self.computation(), &[self.plan.runs.len() - 1])
     }
 
@@ -82,5 +88,29 @@ impl Session {
         } else {
             self.notices.push("Only the last run can be removed, after it has finished".to_owned());
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::PathBuf;
+
+    use super::*;
+    use crate::sensors::CameraRig;
+    use crate::session::plan::{SessionPlan, SessionRequest};
+
+    #[test]
+    fn a_cluster_that_is_added_leaves_out_a_camera_that_it_cannot_use() {
+        let log_path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("sample_logs/garden.mcap");
+        let request = SessionRequest { log_path, duration_s: Some(0.3), ..SessionRequest::default() };
+        let mut plan = SessionPlan::open(&request).unwrap();
+        let rig = Arc::make_mut(&mut plan.rig);
+        let again = CameraRig { key: "cam2".to_owned(), ..rig.cameras[1].clone() };
+        rig.cameras.push(again);
+        let mut session = Session::start(plan).unwrap();
+        session.add_run("cluster".parse().unwrap());
+        let recording = session.recording();
+        assert_eq!(recording.runs[1].spec.cluster_keys, ["cam0", "cam1"]);
+        assert!(recording.warnings.iter().any(|warning| warning.message.contains("cam2 is not used by 'cluster'")));
     }
 }
