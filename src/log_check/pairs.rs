@@ -88,9 +88,6 @@ fn check_pair(rig: &Rig, measured: &PairMeasurement, findings: &mut Findings) {
     let [first, second] = &measured.keys;
     let pose = rig.base_from_camera(Some(first), second);
     let (Ok(first), Ok(second), Some(pose)) = (rig.camera(first), rig.camera(second), pose) else { return };
-    if first.topic == second.topic {
-        return;
-    }
     let pair = Pair { first, second, second_from_first: pose.inverse(), measured };
     if pair.check_stamps(findings) {
         pair.check_pose(findings);

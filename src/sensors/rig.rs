@@ -352,7 +352,10 @@ impl Rig {
             here_from_camera
                 .is_some_and(|pose| other.model.common_field(&camera.model, &pose.rotation) >= MIN_COMMON_FIELD)
         };
-        self.cameras.iter().filter(|other| !camera.is_on_gimbal() && is_beside(other)).find(is_seen)
+        // Two cameras of one topic, a mistake in the rig, have the same images.
+        let has_own_images = |other: &&CameraRig| other.topic != camera.topic;
+        let beside = self.cameras.iter().filter(|other| !camera.is_on_gimbal() && is_beside(other));
+        beside.filter(has_own_images).find(is_seen)
     }
 
     /// Pose of a camera in the frame of another one, or of the IMU without one. `None` for an unknown key, for cameras with

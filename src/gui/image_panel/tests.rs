@@ -129,7 +129,8 @@ fn with_second_camera(mut recording: Recording) -> Recording {
     let mount = CameraMount::Static { imu_from_camera: first_from_camera };
     rig.cameras[0].mount = CameraMount::Static { imu_from_camera: RigidTransform::identity() };
     let relative_prior = Some(ChainPrior::RELATIVE);
-    rig.cameras.push(CameraRig { key: "cam1".to_owned(), mount, first_from_camera, relative_prior, ..first });
+    let [key, topic] = ["cam1", "/cam1/image"].map(str::to_owned);
+    rig.cameras.push(CameraRig { key, mount, first_from_camera, relative_prior, topic, ..first });
     for (number, step) in recording.runs[0].steps.iter_mut().enumerate() {
         let step = Arc::make_mut(step);
         step.report.calibration.further_cameras.push(FurtherCameraEstimate {
