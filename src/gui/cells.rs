@@ -1,9 +1,15 @@
 //! Cells of a grid of images.
 
-use egui::{Rect, Vec2, pos2, vec2};
+use egui::{Rect, Ui, Vec2, pos2, vec2};
 
 /// Distance of two cells in points.
 const GAP: f32 = 6.0;
+
+/// The free room without a line of a height at its lower edge, and this line.
+pub(super) fn above_line(ui: &Ui, height: f32) -> (Rect, Rect) {
+    let room = ui.available_rect_before_wrap();
+    room.split_top_bottom_at_y((room.bottom() - height).max(room.top()))
+}
 
 /// Number of columns with which images are largest in an area; every cell has lines of this height beside its image.
 pub(super) fn columns_of_images(area: Vec2, count: usize, lines_height: f32) -> usize {

@@ -2,7 +2,7 @@
 
 use egui::{Rect, RichText, Ui, UiBuilder};
 
-use crate::gui::cells::{cells, columns_of_images};
+use crate::gui::cells::{above_line, cells, columns_of_images};
 use crate::gui::image_panel::ImagePanel;
 use crate::gui::scene::ScenePanel;
 use crate::gui::{Panel as _, PanelContext, Selection};
@@ -30,10 +30,7 @@ impl SideBySideImages {
         self.panels.resize_with(ctx.recording.runs.len(), ImagePanel::default);
         let Self { lead, panels } = self;
         lead.common_controls_ui(ui, ctx);
-        let (images, legend) = {
-            let room = ui.available_rect_before_wrap();
-            room.split_top_bottom_at_y((room.bottom() - LEGEND_HEIGHT).max(room.top()))
-        };
+        let (images, legend) = above_line(ui, LEGEND_HEIGHT);
         let columns = columns_of_images(images.size(), ctx.recording.runs.len(), LABEL_HEIGHT);
         each_run(ui, ctx, (images, columns), |ui, ctx, run| {
             let panel = &mut panels[run];

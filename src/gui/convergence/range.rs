@@ -8,7 +8,7 @@ use crate::gui::theme::RunStyle;
 
 /// Largest extension of the range on either side by other runs, as a ratio of the shown run's range.
 const WIDENING: f64 = 0.5;
-/// Ratio of the whole range to that of the last band from which on the scale is broken.
+/// Ratio of the whole range to the middle part from which on the scale is broken.
 const BROKEN_FROM: f64 = 3.0;
 /// Half the height of the middle part of a broken scale, in standard deviations of the last value.
 const MIDDLE_SIGMAS: f64 = 4.5;

@@ -17,7 +17,7 @@ use egui::{
 use self::model::ImageModel;
 pub use self::model::SolveSide;
 use self::paint::{ImagePlacement, MarkOptions};
-use super::cells::{cells, columns_of_images};
+use super::cells::{above_line, cells, columns_of_images};
 use super::help::terms::window;
 use super::plot::pan_zoom::PanZoom;
 use super::under_pointer::{Item, offer, offer_item};
@@ -71,10 +71,7 @@ impl Panel for ImagePanel {
         self.controls_ui(ui, context, run, &keys);
         let shown = context.selection.cameras.indices(&keys);
         let line = LINE_HEIGHT + ui.spacing().item_spacing.y;
-        let (images, legend) = {
-            let room = ui.available_rect_before_wrap();
-            room.split_top_bottom_at_y((room.bottom() - line).max(room.top()))
-        };
+        let (images, legend) = above_line(ui, line);
         let columns = columns_of_images(images.size(), shown.len(), line);
         let mut moved = false;
         for (camera, cell) in shown.clone().zip(cells(images, columns, shown.len())) {

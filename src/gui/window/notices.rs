@@ -117,15 +117,14 @@ impl Notices {
         }
         let Some(Toast { level, text, .. }) = self.toasts.last() else { return };
         let (mark, color) = level.look(theme);
-        let close = ui.add(Button::new("x").small());
-        close.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, "Dismiss notice"));
+        let dismissed = dismiss_ui(ui);
         let others = self.toasts.len() - 1;
         let more = if others > 0 { format!(" (+{others})") } else { String::new() };
         let line = RichText::new(format!("{mark} {text}{more}")).color(color);
         let label = ui.add(egui::Label::new(line).truncate().sense(egui::Sense::click()));
         label.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, text));
         let label = label.on_hover_text(text.as_str());
-        if close.clicked() {
+        if dismissed {
             self.toasts.pop();
         } else if label.clicked() {
             self.list_open = true;
@@ -150,9 +149,7 @@ impl Notices {
                     ui.horizontal_top(|ui| {
                         ui.label(RichText::new(mark).color(color));
                         ui.add(egui::Label::new(RichText::new(&toast.text).color(theme.text_strong)).wrap());
-                        let close = ui.add(Button::new("x").small());
-                        close.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, "Dismiss notice"));
-                        if close.clicked() {
+                        if dismiss_ui(ui) {
                             dismissed = Some(number);
                         }
                     });
@@ -214,6 +211,13 @@ impl Notices {
         });
         self.list_open = open;
     }
+}
+
+/// Draws the button that dismisses a message; true if it was clicked.
+fn dismiss_ui(ui: &mut Ui) -> bool {
+    let close = ui.add(Button::new("x").small());
+    close.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, "Dismiss notice"));
+    close.clicked()
 }
 
 /// Draws a banner for each run that stopped with an error.

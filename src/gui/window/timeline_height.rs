@@ -22,7 +22,7 @@ pub(super) struct TimelineHeight {
     open: bool,
     /// Height in points of the room of panels and timeline.
     room: f32,
-    /// Height in points.
+    /// Height in points that the timeline gets.
     pub(super) wanted: f32,
     /// True while a button of the pointer is down.
     pressed: bool,
