@@ -91,10 +91,12 @@ impl FigureArguments {
         let Some(name) = &self.camera else { return Ok(ShownCameras::Main) };
         let run = &recording.runs[self.run(recording)?];
         let keys = run.last_camera_keys();
-        if name != "all" && !keys.contains(&name.as_str()) {
-            bail!("--camera {name}: run {} has {}; give one of them or all", run.spec.label, keys.join(", "));
+        match ShownCameras::of_name(name) {
+            ShownCameras::Key(key) if !keys.contains(&key.as_str()) => {
+                bail!("--camera {name}: run {} has {}; give one of them or all", run.spec.label, keys.join(", "))
+            }
+            cameras => Ok(cameras),
         }
-        Ok(ShownCameras::of_name(name))
     }
 
     /// The figure of a panel; `cursor_ns` is the stamp of --at or --every.

@@ -38,7 +38,7 @@ pub(super) fn write(
     let Some((_, tracks)) = step.image(camera) else { return Ok(()) };
     let frame_index = step.report.frame_index;
     let mut solved: BTreeMap<FeatureId, Solved> = BTreeMap::new();
-    for feature in &step.report.features {
+    for feature in step.report.features.iter().filter(|feature| feature.id.camera() == camera) {
         let observed = feature.observations.iter().find(|seen| seen.frame_index == frame_index);
         let Some(observed) = observed else { continue };
         let line = observed

@@ -146,13 +146,17 @@ impl FrameSets {
         }
         // An input has the samples since the previous image of its own camera, but another camera may have had an image
         // since then.
-        let imu = match self.after_frame.as_slice() {
-            later if frame.imu.first().zip(self.end).is_some_and(|(first, end)| first.stamp_ns > end.stamp_ns) => {
-                following(self.end, &merged([later, &frame.imu]))
-            }
-            _ => following(self.end, &frame.imu),
+        let begins_later = frame.imu.first().zip(self.end).is_some_and(|(first, end)| first.stamp_ns > end.stamp_ns);
+        let imu = if begins_later && !self.after_frame.is_empty() {
+            following(self.end, &merged([self.after_frame.as_slice(), &frame.imu]))
+        } else {
+            following(self.end, &frame.imu)
         };
-        self.after_frame = if self.frame_camera.is_some() { set.imu_after() } else { Vec::new() };
+        let is_interleaved = self.frame_camera.is_some();
+        let imu_after = if is_interleaved { set.imu_after() } else { frame.imu_after.clone() };
+        if is_interleaved {
+            self.after_frame.clone_from(&imu_after);
+        }
         self.end = imu.last().copied().or(self.end);
         let gimbal_imu =
             if frame.gimbal_imu.is_empty() { Vec::new() } else { following(self.gimbal_end, &frame.gimbal_imu) };
@@ -160,13 +164,12 @@ impl FrameSets {
         let image = |image: &Option<Arc<OwnedStepInput>>| {
             image.as_ref().map_or_else(StepImage::default, |image| image.images[0].clone())
         };
-        let is_interleaved = self.frame_camera.is_some();
         OwnedStepInput {
             frame_index: main.map_or(OTHER_CAMERA_FRAMES * set.frame + frame.frame_index, |main| main.frame_index),
             stamp_ns: self.main_shift_ns.map_or(frame.stamp_ns, |shift_ns| frame.imu_stamp_ns() - shift_ns),
             log_time_ns: frame.log_time_ns,
             imu,
-            imu_after: if is_interleaved { set.imu_after() } else { frame.imu_after.clone() },
+            imu_after,
             image_times_s: if is_interleaved { set.image_times_s() } else { Vec::new() },
             gimbal_imu,
             joint_angles: main.unwrap_or(frame).joint_angles.clone(),

@@ -240,7 +240,11 @@ pub(in crate::session) fn cameras_of_run<'rig>(
 
 /// Names the cameras of a cluster of all cameras, if it cannot use others; returns a warning for each of those.
 pub(in crate::session) fn name_usable_cameras(log: &Arc<FlightLog>, rig: &Rig, spec: &mut RunSpec) -> Vec<LogWarning> {
-    if spec.parameterization != ParameterizationChoice::Cluster || !spec.cluster_keys.is_empty() {
+    // A cluster has at least two cameras, so that one of two is not left out.
+    if spec.parameterization != ParameterizationChoice::Cluster
+        || !spec.cluster_keys.is_empty()
+        || rig.cameras.len() < 3
+    {
         return Vec::new();
     }
     let imu_ns = imu_samples(log, rig).ok().and_then(|mut samples| samples.next()).map(|sample| sample.stamp_ns);

@@ -59,15 +59,19 @@ impl StepRecord {
 
     /// Features of all cameras that are tracked from their previous images, and newly detected ones.
     pub fn tracked_and_detected(&self) -> [usize; 2] {
-        let further = self.further_images.iter().map(|image| &image.tracks);
-        let statistics = std::iter::once(&self.tracks).chain(further).map(|tracks| tracks.statistics);
+        let statistics = self.tracks_of_all().map(|tracks| tracks.statistics);
         statistics.fold([0, 0], |[tracked, detected], of| [tracked + of.tracked, detected + of.detected])
     }
 
     /// Number of features in the images of all cameras.
     pub fn feature_count(&self) -> usize {
-        let further = self.further_images.iter().map(|image| image.tracks.features.len());
-        self.tracks.features.len() + further.sum::<usize>()
+        self.tracks_of_all().map(|tracks| tracks.features.len()).sum()
+    }
+
+    /// Tracks by camera, the main camera first; empty where an image is missing.
+    fn tracks_of_all(&self) -> impl Iterator<Item = &TrackedFrame> {
+        let further = self.further_images.iter().map(|image| &*image.tracks);
+        std::iter::once(&*self.tracks).chain(further)
     }
 
     /// Memory in bytes without the tracks, which runs on the same camera share.
