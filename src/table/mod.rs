@@ -3,6 +3,7 @@
 //! The definition stands next to the type of its rows, in the lowest folder where the values are known; files, screens
 //! and pages are made from it.
 
+mod alignment;
 mod cell;
 mod column;
 #[cfg(feature = "logs")]
@@ -10,6 +11,7 @@ mod csv;
 mod number;
 pub mod text;
 
+pub use self::alignment::align_numbers;
 pub use self::cell::{Cell, CellValue, ColumnType, Stamp};
 #[cfg(test)]
 pub(crate) use self::column::documented;

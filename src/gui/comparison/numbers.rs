@@ -6,6 +6,7 @@ use super::columns::{label_of, style_of};
 use super::scores::Scores;
 use crate::gui::PanelContext;
 use crate::gui::help::terms::divergence;
+use crate::gui::table::{aligned_rows, number_ui};
 use crate::gui::theme::ROW_HEIGHT;
 use crate::gui::units::{fixed, seconds, significant};
 use crate::session::{Command, ComparedQuantity, Comparison, Divergence};
@@ -73,15 +74,18 @@ pub(super) fn accuracy_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, scores: &Scor
             ui.label(text).on_hover_text(format!("{}\n{POSES_ONLY}", lane.source));
         }
         ui.end_row();
-        for row in scores.rows() {
+        let rows = scores.rows();
+        let texts = rows.iter().map(|row| {
+            let mark = |run| if row.best() == Some(run) { " ✔" } else { "" };
+            (0..row.values.len()).map(|run| format!("{}{}", row.text(run), mark(run))).collect()
+        });
+        for (row, texts) in rows.iter().zip(aligned_rows(texts.collect())) {
             let best = row.best();
             ui.label(RichText::new(&row.name).color(theme.text)).on_hover_text(row.meaning);
             ui.label(RichText::new(row.unit).color(theme.text_weak)).on_hover_text(row.meaning);
-            for run in 0..row.values.len() {
-                let text = row.text(run);
-                let text = if best == Some(run) { format!("{text} ✔") } else { text };
+            for (run, text) in texts.into_iter().enumerate() {
                 let color = if best == Some(run) { theme.ok } else { theme.text_strong };
-                ui.label(RichText::new(text).monospace().color(color)).on_hover_text(row.meaning);
+                number_ui(ui, &text, color).on_hover_text(row.meaning);
             }
             ui.end_row();
         }
@@ -151,9 +155,15 @@ fn table_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, number: usize, own: &str, c
             ui.label(RichText::new(term.name).small().color(theme.text_weak)).on_hover_text(term.meaning);
         }
         ui.end_row();
-        for (quantity, divergence) in ComparedQuantity::all().zip(&comparison.divergences) {
-            let Divergence { exact_ns, notable_ns, largest } = *divergence;
-            let Some((largest, largest_ns)) = largest else { continue };
+        let found = ComparedQuantity::all().zip(&comparison.divergences);
+        let found: Vec<_> = found.filter_map(|(quantity, it)| Some((quantity, it, it.largest?))).collect();
+        let texts = found.iter().map(|(quantity, _, (largest, _))| {
+            let now = comparison.at(*quantity, ctx.cursor_ns);
+            [now, Some(*largest)].map(|apart| apart.map_or_else(|| "–".to_owned(), |it| difference_text(*quantity, it)))
+        });
+        let texts = aligned_rows(texts.map(Vec::from).collect());
+        for ((quantity, divergence, (largest, largest_ns)), texts) in found.into_iter().zip(texts) {
+            let Divergence { exact_ns, notable_ns, .. } = *divergence;
             let name = |what: &str| format!("{own}, {}: {what}", quantity.name());
             let apart = comparison.at(quantity, ctx.cursor_ns);
             ui.label(RichText::new(quantity.name()).color(theme.text)).on_hover_text(quantity.meaning());
@@ -162,13 +172,10 @@ fn table_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, number: usize, own: &str, c
             let tolerance = ui.label(RichText::new(tolerance).small().color(theme.text_weak));
             tolerance.on_hover_text(divergence::THRESHOLD.meaning);
             time_button(ui, ctx, notable_ns, &name("first difference above the threshold"));
-            let now = apart.map_or_else(|| "–".to_owned(), |apart| difference_text(quantity, apart));
             let is_notable = apart.is_some_and(|apart| apart >= quantity.notable());
             let color = if is_notable { theme.warn } else { theme.text_strong };
-            let now = ui.label(RichText::new(now).monospace().color(color));
-            now.on_hover_text(divergence::AT_CURSOR.meaning);
-            let maximum = RichText::new(difference_text(quantity, largest)).monospace().color(theme.text_strong);
-            ui.label(maximum).on_hover_text(divergence::MAXIMUM.meaning);
+            number_ui(ui, &texts[0], color).on_hover_text(divergence::AT_CURSOR.meaning);
+            number_ui(ui, &texts[1], theme.text_strong).on_hover_text(divergence::MAXIMUM.meaning);
             time_button(ui, ctx, (largest > 0.0).then_some(largest_ns), &name("maximum difference"));
             ui.end_row();
         }

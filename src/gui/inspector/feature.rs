@@ -41,7 +41,7 @@ pub(super) fn ui(ui: &mut Ui, ctx: &PanelContext<'_>, step: &StepRecord, id: Fea
         let values = [position.x, position.y, position.z].map(|value| fixed(value, 3));
         rows.push((feature::LANDMARK, vec![values.join(", ")]));
     }
-    rows_ui(ui, theme, "feature", &rows);
+    rows_ui(ui, theme, "feature", rows);
     let Some(report) = report else { return };
     let length = |residual: Option<nalgebra::Vector2<f64>>| {
         residual.map_or_else(|| "–".to_owned(), |residual| fixed(residual.norm(), 2))

@@ -10,6 +10,7 @@ use crate::gui::help::terms::parameter as terms;
 use crate::gui::parameter_names::meaning_of;
 use crate::gui::units::fixed;
 use crate::session::{RunRecord, StepRecord};
+use crate::table::align_numbers;
 use crate::text::Named as _;
 
 pub(super) fn ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, step: &StepRecord, parameter: ParameterId) {
@@ -48,6 +49,7 @@ pub(super) fn ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, step: &St
         let ratio = fixed(error.abs() / sigma, 1);
         rows.push((terms::ERROR, vec![format!("{} ({ratio} σ)", shown.value(error, sigma))]));
     }
+    align_numbers(rows.iter_mut().flat_map(|(_, values)| values));
     let report = ctx.flight(ui, run);
     let here = report.history.verdict(parameter, report.history.row_at(step.report.stamp_ns));
     rows.push((terms::VERDICT_HERE, vec![here.name().to_owned()]));
@@ -56,7 +58,7 @@ pub(super) fn ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, step: &St
         let since = flight.since_s().map_or_else(String::new, |since_s| format!(" since {} s", fixed(since_s, 2)));
         rows.push((terms::VERDICT, vec![format!("{}{since}", flight.verdict.name())]));
     }
-    rows_ui(ui, theme, "parameter", &rows);
+    rows_ui(ui, theme, "parameter", rows);
     let texts = flight.map(|flight| [("Why: ", &flight.reason), ("What helps: ", &flight.remedy)]);
     for (head, text) in texts.into_iter().flatten().filter(|(_, text)| !text.is_empty()) {
         ui.add(egui::Label::new(RichText::new(format!("{head}{text}")).color(theme.text)).wrap());

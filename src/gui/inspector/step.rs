@@ -27,7 +27,7 @@ pub(super) fn frame_ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, ste
     let [tracked, detected] = step.tracked_and_detected();
     let tracks = format!("{tracked} continued, {detected} new");
     rows.push((frame::TRACKS, vec![tracks]));
-    rows_ui(ui, ctx.theme, "step", &rows);
+    rows_ui(ui, ctx.theme, "step", rows);
     let Some(newest) = report.newest() else { return };
 
     let three = |term: Term, values: [f64; 3], decimals: usize| -> Row {
@@ -55,7 +55,7 @@ pub(super) fn frame_ui(ui: &mut Ui, ctx: &PanelContext<'_>, run: &RunRecord, ste
             2,
         ));
     }
-    rows_ui(ui, ctx.theme, "state", &rows);
+    rows_ui(ui, ctx.theme, "state", rows);
     if !newest.joint_angles_rad.is_empty() {
         let encoders = newest.encoder_angles_rad.as_deref();
         let rig_joints = ctx.recording.rig.gimbal.as_ref().map_or(&[][..], |gimbal| &gimbal.joints);
@@ -140,5 +140,5 @@ pub(super) fn times_ui(ui: &mut Ui, theme: &Theme, report: &StepReport) {
         times::TOTAL,
     ];
     let rows: Vec<Row> = terms.iter().zip(&StageTimes::STAGES).map(row).collect();
-    rows_ui(ui, theme, "times", &rows);
+    rows_ui(ui, theme, "times", rows);
 }

@@ -5,6 +5,7 @@ use egui::{Align2, Rect, RichText, Role, ScrollArea, Sense, Stroke, Ui, WidgetIn
 use super::context::StudyContext;
 use super::points::Points;
 use crate::gui::plot::{GridLine, ValueAxis, ValuePlot};
+use crate::gui::table::{aligned_rows, number_ui};
 use crate::gui::theme::{ThemeName, label_font};
 use crate::gui::units::{fixed, significant};
 use crate::gui::widgets::describe;
@@ -75,15 +76,16 @@ impl ParametersPanel {
                     ui.label(RichText::new(*heading).color(theme.text_weak)).on_hover_text(&*column.meaning);
                 }
                 ui.end_row();
-                for (number, of) in self.errors.iter().enumerate() {
+                let texts = |of| shown[1..].iter().map(|(column, _)| column.shown_text(of, Medium::Screen)).collect();
+                let texts = aligned_rows(self.errors.iter().map(texts).collect());
+                for (number, (of, texts)) in self.errors.iter().zip(texts).enumerate() {
                     if ctx.presentation.is_figure() {
                         ui.label(RichText::new(&of.name).color(theme.text));
                     } else if ui.selectable_label(number == chosen, &of.name).clicked() {
                         self.chosen.clone_from(&of.name);
                     }
-                    for (column, _) in &shown[1..] {
-                        let text = RichText::new(column.shown_text(of, Medium::Screen)).monospace();
-                        ui.label(text.color(theme.tone(column.shown_tone(of))));
+                    for ((column, _), text) in shown[1..].iter().zip(texts) {
+                        number_ui(ui, &text, theme.tone(column.shown_tone(of)));
                     }
                     ui.end_row();
                 }

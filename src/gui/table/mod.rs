@@ -4,8 +4,8 @@
 use std::sync::Arc;
 
 use egui::{
-    Align2, Color32, FontId, Galley, Grid, Painter, Rect, RichText, Role, Sense, Stroke, StrokeKind, Ui, WidgetInfo,
-    pos2, vec2,
+    Align2, Color32, FontId, Galley, Grid, Painter, Rect, Response, RichText, Role, Sense, Stroke, StrokeKind, Ui,
+    WidgetInfo, pos2, vec2,
 };
 
 use crate::gimbal::ParameterId;
@@ -13,7 +13,7 @@ use crate::gui::PanelContext;
 use crate::gui::help::terms::Term;
 use crate::gui::theme::{Theme, label_font, number_font};
 use crate::gui::under_pointer::{Item, offer, offer_item};
-use crate::table::{Column, Medium, Style, Tone};
+use crate::table::{Column, Medium, Style, Tone, align_numbers};
 
 /// Space above and below the text of a row in points.
 const PADDING: f32 = 2.0;
@@ -80,15 +80,20 @@ pub(crate) struct TableRow {
 
 /// A table of calibration parameters that is ready to be painted.
 pub(crate) struct TableUi<'t, 'c, Row> {
-    /// Shown columns with their left edges, relative to the table, and widths; wrapped texts below the row have none.
-    columns: Vec<(&'t Column<'c, Row>, Option<[f32; 2]>)>,
+    columns: Vec<PlacedColumn<'t, 'c, Row>>,
     rows: &'t [Row],
     gap: f32,
     /// Width in points in which wrapped texts are laid out, and smallest width of a row.
     width: f32,
     min_width: f32,
-    /// True if numbers end at the right edge of their column.
-    numbers_right: bool,
+}
+
+/// A shown column with the texts of its cells by row.
+struct PlacedColumn<'t, 'c, Row> {
+    column: &'t Column<'c, Row>,
+    texts: Vec<String>,
+    /// Left edge, relative to the table, and width in points; `None` for wrapped texts below the row.
+    place: Option<[f32; 2]>,
 }
 
 impl<'t, 'c, Row> TableUi<'t, 'c, Row> {
@@ -100,36 +105,30 @@ impl<'t, 'c, Row> TableUi<'t, 'c, Row> {
         let sort_mark = if wrapped.is_empty() { "" } else { " ▼" };
         let mut left = MARGIN;
         let mut placed = Vec::new();
+        let texts_of = |column: &Column<'_, Row>| -> Vec<String> {
+            rows.iter().map(|row| column.shown_text(row, Medium::Screen)).collect()
+        };
         for column in short {
             let heading = column.heading(Medium::Screen).unwrap_or_default();
-            let cells = rows.iter().map(|row| size(column.shown_text(row, Medium::Screen), font_of(column.style)));
+            let mut texts = texts_of(column);
+            if column.style == Style::Number {
+                align_numbers(&mut texts);
+            }
+            let cells = texts.iter().map(|text| size(text.clone(), font_of(column.style)));
             let widest = cells.fold(size(format!("{heading}{sort_mark}"), label_font()), f32::max);
             let width = if column.style == Style::Drawing { DRAWING_WIDTH } else { widest };
-            placed.push((column, Some([left, width])));
+            placed.push(PlacedColumn { column, texts, place: Some([left, width]) });
             left += width + gap;
         }
         let room = width - left - gap;
         let min_width = if wrapped.is_empty() { left } else { 0.0 };
         let is_beside = 0.5 * room >= MIN_TEXT_WIDTH;
         for (column, fraction) in wrapped.into_iter().zip([FIRST_TEXT_FRACTION, 1.0 - FIRST_TEXT_FRACTION]) {
-            placed.push((column, is_beside.then_some([left, fraction * room])));
+            let place = is_beside.then_some([left, fraction * room]);
+            placed.push(PlacedColumn { column, texts: texts_of(column), place });
             left += fraction * room + gap;
         }
-        Self { columns: placed, rows, gap, width, min_width, numbers_right: false }
-    }
-
-    /// Ends numbers at the right edge of their column.
-    pub(crate) fn numbers_right(mut self) -> Self {
-        self.numbers_right = true;
-        self
-    }
-
-    fn anchor(&self, column: &Column<'_, Row>, left: f32, width: f32) -> (f32, Align2) {
-        if self.numbers_right && column.style == Style::Number {
-            (left + width, Align2::RIGHT_CENTER)
-        } else {
-            (left, Align2::LEFT_CENTER)
-        }
+        Self { columns: placed, rows, gap, width, min_width }
     }
 
     /// Draws the headings; with an order, a click sorts by the column.
@@ -142,18 +141,17 @@ impl<'t, 'c, Row> TableUi<'t, 'c, Row> {
     ) {
         let theme = ctx.theme;
         let (_, rect) = ui.allocate_space(vec2(self.min_width.max(ui.available_width()), height));
-        for (column, place) in &self.columns {
-            let (Some([left, width]), Some(heading)) = (place, column.heading(Medium::Screen)) else { continue };
+        for PlacedColumn { column, place, .. } in &self.columns {
+            let (Some([left, _]), Some(heading)) = (place, column.heading(Medium::Screen)) else { continue };
             let sorted = order.as_deref().filter(|order| order.heading == heading);
             let mark = match sorted.filter(|_| !ctx.presentation.is_figure()) {
                 None => "",
                 Some(order) if order.descending => " ▼",
                 Some(_) => " ▲",
             };
-            let (x, align) = self.anchor(column, rect.left() + left, *width);
             let color = if sorted.is_some() { theme.text_strong } else { theme.text_weak };
-            let place = pos2(x, rect.center().y);
-            let drawn = ui.painter().text(place, align, format!("{heading}{mark}"), label_font(), color);
+            let place = pos2(rect.left() + left, rect.center().y);
+            let drawn = ui.painter().text(place, Align2::LEFT_CENTER, format!("{heading}{mark}"), label_font(), color);
             if heading.is_empty() {
                 continue;
             }
@@ -206,7 +204,7 @@ impl<'t, 'c, Row> TableUi<'t, 'c, Row> {
     ) -> bool {
         let theme = *ctx.theme;
         let line = ui.fonts_mut(|fonts| fonts.row_height(&label_font()));
-        let texts = self.wrapped_texts(ui, &theme, row, line);
+        let texts = self.wrapped_texts(ui, &theme, number, line);
         let bottom = texts.iter().map(|(_, top, galley)| top + galley.size().y).fold(line, f32::max);
         let (_, rect) = ui.allocate_space(vec2(self.min_width.max(ui.available_width()), bottom + 2.0 * PADDING));
         if !ui.is_rect_visible(rect) {
@@ -228,7 +226,7 @@ impl<'t, 'c, Row> TableUi<'t, 'c, Row> {
             painter.rect_filled(rect, 0.0, theme.surface_raised.gamma_multiply(0.35));
         }
         let middle = rect.top() + PADDING + 0.5 * line;
-        for (index, (column, place)) in self.columns.iter().enumerate() {
+        for (index, PlacedColumn { column, texts, place }) in self.columns.iter().enumerate() {
             let Some([left, width]) = place.map(|[left, width]| [rect.left() + left, width]) else { continue };
             match column.style {
                 Style::Wrapped => {}
@@ -238,9 +236,8 @@ impl<'t, 'c, Row> TableUi<'t, 'c, Row> {
                 }
                 Style::Label | Style::Number => {
                     let tone = if selected && index == 0 { Tone::Accent } else { column.shown_tone(row) };
-                    let (x, align) = self.anchor(column, left, width);
-                    let text = column.shown_text(row, Medium::Screen);
-                    painter.text(pos2(x, middle), align, text, font_of(column.style), theme.tone(tone));
+                    let (text, font) = (&texts[number], font_of(column.style));
+                    painter.text(pos2(left, middle), Align2::LEFT_CENTER, text, font, theme.tone(tone));
                 }
             }
         }
@@ -268,12 +265,13 @@ impl<'t, 'c, Row> TableUi<'t, 'c, Row> {
     }
 
     /// Wrapped texts of a row with their places: left edge, and top below the first line's.
-    fn wrapped_texts(&self, ui: &Ui, theme: &Theme, row: &Row, line: f32) -> Vec<(f32, f32, Arc<Galley>)> {
+    fn wrapped_texts(&self, ui: &Ui, theme: &Theme, row: usize, line: f32) -> Vec<(f32, f32, Arc<Galley>)> {
         let lay_out = |text: String, width: f32| ui.painter().layout(text, label_font(), theme.text, width);
         let mut top = line + PADDING;
         let mut texts = Vec::new();
-        for (column, place) in self.columns.iter().filter(|(column, _)| column.style == Style::Wrapped) {
-            let text = column.shown_text(row, Medium::Screen);
+        for placed in self.columns.iter().filter(|placed| placed.column.style == Style::Wrapped) {
+            let PlacedColumn { column, texts: all, place } = placed;
+            let text = all[row].clone();
             if let Some([left, width]) = place {
                 texts.push((*left, 0.0, lay_out(text, *width)));
             } else if !text.is_empty() {
@@ -292,7 +290,15 @@ fn font_of(style: Style) -> FontId {
     if style == Style::Number { number_font() } else { label_font() }
 }
 
-/// A grid of texts under headings; hovering a cell explains its column.
+/// Rows with the numbers of each column aligned.
+pub(crate) fn aligned_rows(mut rows: Vec<Vec<String>>) -> Vec<Vec<String>> {
+    for column in 0..rows.iter().map(Vec::len).max().unwrap_or(0) {
+        align_numbers(rows.iter_mut().filter_map(|row| row.get_mut(column)));
+    }
+    rows
+}
+
+/// A grid of texts under headings, with aligned numbers; hovering a cell explains its column.
 pub(crate) fn grid_ui(
     ui: &mut Ui,
     theme: &Theme,
@@ -305,13 +311,20 @@ pub(crate) fn grid_ui(
             ui.label(RichText::new(heading).small().color(theme.text_weak)).on_hover_text(term.meaning);
         }
         ui.end_row();
-        for row in rows {
+        for row in aligned_rows(rows.collect()) {
             for (cell, (_, term)) in row.into_iter().zip(headings) {
-                ui.label(RichText::new(cell).monospace().color(theme.text_strong)).on_hover_text(term.meaning);
+                number_ui(ui, &cell, theme.text_strong).on_hover_text(term.meaning);
             }
             ui.end_row();
         }
     });
+}
+
+/// A text with aligned numbers; a screen reader gets it without the spaces in front.
+pub(crate) fn number_ui(ui: &mut Ui, text: &str, color: Color32) -> Response {
+    let label = ui.label(RichText::new(text).monospace().color(color));
+    label.widget_info(|| WidgetInfo::labeled(Role::Label, true, text.trim_start()));
+    label
 }
 
 /// Headings that are the names of the quantities.

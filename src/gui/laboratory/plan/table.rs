@@ -64,7 +64,7 @@ pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, shown: &ShownPredictio
     let theme = *ctx.theme;
     let rows = PlannedRow::all(shown.now, shown.before);
     let columns = PlannedRow::columns(shown.flight.map_or_else(String::new, FlightSoFar::meaning));
-    let table = TableUi::new(ui, &columns, &rows, GAP, ui.available_width()).numbers_right();
+    let table = TableUi::new(ui, &columns, &rows, GAP, ui.available_width());
     table.headings_ui(ui, ctx, HEADING_HEIGHT, None);
     let parameters = shown.situation.chain.parameters();
     let names: Vec<String> = parameters.iter().map(|parameter| shown.situation.names.name(*parameter)).collect();
