@@ -48,7 +48,7 @@ pub(crate) fn hinted_choice_ui<'a, T: PartialEq>(
     hint: impl Fn(&T) -> &'a str,
 ) -> Response {
     let name = name.into();
-    let combo = ComboBox::from_id_salt(name.text()).width(width).selected_text(text(value));
+    let combo = ComboBox::from_id_salt(name.text()).width(width).truncate().selected_text(text(value));
     let label = ui.label(name);
     let shown = combo.show_ui(ui, |ui| {
         for choice in choices {

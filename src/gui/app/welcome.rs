@@ -108,7 +108,10 @@ impl Welcome {
         let mut chosen = None;
         let running = self.flight.is_running();
         ui.horizontal_wrapped(|ui| {
-            let big = |text: &str| Button::new(RichText::new(text).size(14.0)).min_size(vec2(178.0, 30.0));
+            // Four buttons to the right edge, or as many as fit in a row.
+            let gaps = 3.0 * ui.spacing().item_spacing.x;
+            let width = (0.25 * (ui.available_width() - gaps)).floor().max(160.0);
+            let big = |text: &str| Button::new(RichText::new(text).size(14.0)).min_size(vec2(width, 30.0));
             let tour = big("Take the tour").fill(theme.accent.gamma_multiply(0.35));
             let hover = "Six steps over the sample flight: which parameter is unobservable, since when, why, and \
                          which motion fixes it";

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use egui::style::ScrollStyle;
 use egui::{Color32, CornerRadius, FontDefinitions, FontFamily, FontId, Frame, Shadow, Stroke, TextStyle, vec2};
 
 use super::{CORNER_RADIUS, SMALLEST_TEXT, Theme, mix};
@@ -25,6 +26,8 @@ impl Theme {
         style.spacing.button_padding = vec2(6.0, 2.0);
         style.spacing.interact_size = vec2(28.0, 20.0);
         style.spacing.indent = 12.0;
+        // Bars are visible without the pointer: they are the only sign of what is below the edge.
+        style.spacing.scroll = ScrollStyle::thin();
         style.interaction.selectable_labels = false;
         style.interaction.tooltip_delay = 0.3;
         style.animation_time = 0.08;

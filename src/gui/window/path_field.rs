@@ -3,13 +3,15 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use egui::{Id, Key, Modifiers, RichText, ScrollArea, TextEdit, Ui};
+use egui::{Button, Id, Key, Modifiers, RichText, ScrollArea, TextEdit, Ui, vec2};
 
 use crate::gui::desktop::{Desktop, PathEntry};
 use crate::gui::theme::Theme;
 
 /// Maximum number of completions.
 const MAX_ENTRIES: usize = 200;
+/// Width of the button beside the field in points.
+const OPEN_WIDTH: f32 = 54.0;
 
 /// The text field with its completions.
 #[derive(Default)]
@@ -71,7 +73,7 @@ impl PathField {
         }
 
         ui.horizontal(|ui| {
-            let width = ui.available_width() - 60.0;
+            let width = ui.available_width() - OPEN_WIDTH - ui.spacing().item_spacing.x;
             let edit = TextEdit::singleline(&mut self.typed).id(id).hint_text("/path/to/log.mcap").desired_width(width);
             let edit = ui.add(edit.lock_focus(true));
             edit.widget_info(|| egui::WidgetInfo::labeled(egui::Role::TextInput, true, "Path of the log"));
@@ -81,7 +83,7 @@ impl PathField {
                 select(ui, id, [0, self.typed.chars().count()]);
             }
             let ready = !self.typed.trim().is_empty();
-            if ui.add_enabled(ready, egui::Button::new("Open")).clicked() {
+            if ui.add_enabled(ready, Button::new("Open").min_size(vec2(OPEN_WIDTH, 0.0))).clicked() {
                 opened = Some(self.typed.trim().to_owned());
             }
         });

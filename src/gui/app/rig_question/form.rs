@@ -93,7 +93,7 @@ impl RigForm {
         Grid::new("rig form").num_columns(2).spacing(vec2(12.0, 6.0)).show(ui, |ui| {
             self.mechanism_ui(ui);
             self.camera_ui(ui);
-            let name = ui.label("Position of the camera's gimbal");
+            let name = ui.label("Position of the gimbal");
             ui.horizontal(|ui| {
                 let measured = ui.checkbox(&mut self.position_is_measured, "measured");
                 measured.on_hover_text("Forward, left and up of the IMU; a ruler is accurate enough");

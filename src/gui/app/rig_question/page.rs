@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use egui::{Button, CollapsingHeader, Label, RichText, ScrollArea, TextEdit, Ui};
+use egui::{Align, Button, CollapsingHeader, Label, RichText, ScrollArea, TextEdit, Ui};
 
 use super::draft::{DraftWorker, RigDraft};
 use super::form::RigForm;
@@ -16,13 +16,14 @@ use crate::gui::window::Modal;
 use crate::text::{counted, log_name};
 
 /// Width of the dialog in points.
-const WIDTH: f32 = 900.0;
+const WIDTH: f32 = 980.0;
 /// Largest number of found rigs that are listed.
 const MAX_CANDIDATES: usize = 8;
 /// Height in points of what surrounds the scrolled part: title, buttons and margins.
 const OUTSIDE_HEIGHT: f32 = 150.0;
 const CANDIDATES_HEIGHT: f32 = 120.0;
-const ASSUMED_HEIGHT: f32 = 190.0;
+/// Width in points from which the assumed values are beside the form.
+const MIN_WIDTH_FOR_BOTH: f32 = 900.0;
 const TEXT_HEIGHT: f32 = 240.0;
 
 /// State of the page.
@@ -72,6 +73,7 @@ impl RigPage {
         let modal = Modal { name: "rig question", title: &title, width: WIDTH };
         let (mut answer, stays_open) = modal.ui(ui, theme, |ui| {
             let area = ScrollArea::vertical().max_height(height).min_scrolled_height(height);
+            let area = area.auto_shrink([false, true]);
             let mut answer = area.show(ui, |ui| self.contents_ui(ui, theme)).inner;
             ui.add_space(6.0);
             self.buttons_ui(ui, desktop, &mut answer);
@@ -98,10 +100,14 @@ impl RigPage {
         if draft.is_none() {
             ui.ctx().request_repaint_after(POLL_PERIOD);
         }
-        ui.columns(2, |columns| {
-            let [left, right] = columns else { return };
-            left.add_enabled_ui(self.edited.is_none(), |ui| self.form.ui(ui, theme));
-            draft_ui(right, theme, draft.as_ref());
+        let count = if ui.available_width() < MIN_WIDTH_FOR_BOTH { 1 } else { 2 };
+        ui.columns(count, |columns| {
+            if let Some(left) = columns.first_mut() {
+                left.add_enabled_ui(self.edited.is_none(), |ui| self.form.ui(ui, theme));
+            }
+            if let Some(right) = columns.last_mut() {
+                draft_ui(right, theme, draft.as_ref());
+            }
         });
         self.text_ui(ui, theme, draft.as_ref());
         self.of_form = draft.and_then(Result::ok).map(|draft| draft.text);
@@ -194,12 +200,14 @@ fn draft_ui(ui: &mut Ui, theme: &Theme, draft: Option<&Result<RigDraft, String>>
         Some(Ok(draft)) => {
             let title = format!("{} assumed; measure or confirm each", counted(draft.assumed.len(), "value"));
             ui.label(RichText::new(title).color(theme.text_strong));
-            ScrollArea::vertical().id_salt("assumed").max_height(ASSUMED_HEIGHT).show(ui, |ui| {
-                for field in &draft.assumed {
-                    ui.label(RichText::new(&field.field).small().color(theme.accent));
-                    ui.add(Label::new(RichText::new(&field.reason).small().color(theme.text)).wrap());
+            // Fields with one reason share its text.
+            for fields in draft.assumed.chunk_by(|field, next| field.reason == next.reason) {
+                let names: Vec<&str> = fields.iter().map(|field| field.field.as_str()).collect();
+                for (text, color) in [(names.join(", "), theme.accent), (fields[0].reason.clone(), theme.text)] {
+                    let label = Label::new(RichText::new(text).small().color(color)).halign(Align::Min);
+                    ui.add(label.wrap());
                 }
-            });
+            }
             let hint = "dcvins check lists them and measures some";
             ui.label(RichText::new(hint).small().color(theme.text_weak));
         }
