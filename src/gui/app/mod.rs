@@ -54,7 +54,8 @@ use crate::gui::desktop::Desktop;
 use crate::gui::theme::{Theme, ThemeName};
 use crate::gui::units::counted;
 use crate::gui::window::{
-    MainWindow, NoticeLevel, ProgressMeter, SCALES, SavedLayouts, Settings, first_scale, window_ui,
+    MainWindow, NoticeLevel, ProgressMeter, SCALES, SavedLayouts, Settings, first_scale, hide_covered_pointer,
+    show_pointer, window_ui,
 };
 use crate::gui::{PanelContext, Presentation, Selection};
 use crate::session::{Command, PlaybackSpeed, Recording, WarningLine, log_warning_lines};
@@ -194,6 +195,7 @@ impl App {
     pub fn ui(&mut self, ui: &mut Ui) {
         self.guard_closing(ui);
         self.apply_settings(ui);
+        hide_covered_pointer(ui.ctx());
         self.take_opened();
         self.take_dropped(ui);
         self.read_memory(ui);
@@ -205,6 +207,7 @@ impl App {
             self.welcome_ui(ui);
         }
         self.opening_dialogs_ui(ui);
+        show_pointer(ui.ctx());
         self.take_requests(ui);
         self.receive_report(ui);
         self.update_title(ui);

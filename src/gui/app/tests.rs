@@ -605,3 +605,25 @@ fn dialogs_are_drawn() {
         assert_eq!(app.log().is_some(), log_is_shown);
     }
 }
+
+#[test]
+fn a_dialog_hides_the_tooltip_of_what_it_covers() {
+    let (mut harness, _) = app();
+    harness.get_by_label("Open yard.mcap").click();
+    run_until(&mut harness, |harness| opened(harness).is_some());
+    harness.run_steps(3);
+    let shows =
+        |harness: &Harness<'static, App>, text: &str| harness.query_all_by_label_contains(text).next().is_some();
+    let hint = "yard.mcap\nrig: ";
+    harness.get_by_label("yard.mcap").hover();
+    harness.run_steps(8);
+    assert!(shows(&harness, hint), "a tooltip of the window");
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::O);
+    harness.run_steps(3);
+    assert!(harness.query_by_role_and_label(egui::Role::TextInput, "Path of the log").is_some());
+    assert!(!shows(&harness, hint));
+    // The pointer is where it was; without the dialog the tooltip is back.
+    harness.key_press(Key::Escape);
+    harness.run_steps(8);
+    assert!(shows(&harness, hint));
+}

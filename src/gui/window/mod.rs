@@ -52,8 +52,8 @@ use egui::{CentralPanel, Frame, Margin, Rect, Ui, UiBuilder, vec2};
 use self::actions::Action;
 use self::context_menu::MenuParts;
 use self::dialogs::DialogParts;
-pub(in crate::gui) use self::dialogs::Modal;
 pub use self::dialogs::state::Dialogs;
+pub(in crate::gui) use self::dialogs::{Modal, hide_covered_pointer, show_pointer};
 pub(crate) use self::figure::complete;
 pub use self::figure::{
     FIGURE_FONT_PT, FIGURE_SIDE_MM, FigureContent, FigureFormat, FigureInput, FigureSpec, FigureText, alone_ui,

@@ -17,7 +17,7 @@ pub(super) mod state;
 
 use egui::Ui;
 
-pub(in crate::gui) use self::modal::Modal;
+pub(in crate::gui) use self::modal::{Modal, hide_covered_pointer, show_pointer};
 use self::open_log::Picked;
 use self::state::Dialogs;
 use super::actions::Action;
