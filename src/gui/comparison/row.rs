@@ -136,6 +136,9 @@ pub(super) fn row_ui(
             write(text, style.color);
         }
     }
+    if !beside && curves.iter().any(|curves| curves.bound.extent.is_some()) {
+        write("dashed: 3σ", theme.text_weak);
+    }
     let id = ui.unique_id().with(("row over time", row.id));
     let values: Vec<&str> = lines.iter().filter_map(|line| line.text.as_deref()).collect();
     let wheel = Wheel::in_list(height <= MIN_HEIGHT);

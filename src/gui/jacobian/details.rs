@@ -25,7 +25,8 @@ pub(super) fn headline(model: &JacobianModel, row: usize, column: usize) -> Stri
     format!("{name}: {} {} ({size})", significant(f64::from(norm)), unit_text(block, model.joint_count))
 }
 
-/// Draws the values of the selected row, column or block.
+/// Draws the values of the selected row, column or block; without a row, in the window, the columns of all calibration
+/// parameters.
 pub(super) fn ui(
     ui: &mut Ui,
     ctx: &PanelContext<'_>,
@@ -39,10 +40,26 @@ pub(super) fn ui(
         match picked {
             (Some(row), Some(column)) => block_ui(ui, ctx, run, step, model, (row, column)),
             (Some(row), None) => line_ui(ui, ctx, &strongest_columns(model, row)),
-            (None, Some(column)) => line_ui(ui, ctx, &strongest_rows(model, column)),
-            (None, None) => {}
+            (None, column) => columns_ui(ui, ctx, model, column),
         }
     });
+}
+
+/// Draws a line for the selected column, and in the window one for each other column of a calibration parameter.
+fn columns_ui(ui: &mut Ui, ctx: &PanelContext<'_>, model: &JacobianModel, selected: Option<usize>) {
+    if let Some(column) = selected {
+        line_ui(ui, ctx, &strongest_rows(model, column));
+    } else {
+        let text = "Click a block: its rows, residuals and derivatives, and the feature or parameter in all panels";
+        ui.add(Label::new(RichText::new(text).color(ctx.theme.text_weak)).wrap());
+    }
+    let others = model.jacobian.columns.iter().enumerate().filter(|(column, block)| {
+        !ctx.presentation.is_figure() && block.id.parameter().is_some() && Some(*column) != selected
+    });
+    for (column, _) in others {
+        let text = strongest_rows(model, column);
+        ui.add(Label::new(RichText::new(text).color(ctx.theme.text)).wrap());
+    }
 }
 
 fn line_ui(ui: &mut Ui, ctx: &PanelContext<'_>, text: &str) {

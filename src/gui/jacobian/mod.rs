@@ -11,7 +11,7 @@ mod tests;
 
 use std::sync::Arc;
 
-use egui::{Label, Pos2, Rect, RichText, Role, Sense, Ui, Vec2, WidgetInfo, vec2};
+use egui::{Pos2, Rect, Role, Sense, Ui, Vec2, WidgetInfo, vec2};
 
 use self::model::JacobianModel;
 pub(super) use self::model::{cameras, column_name, name_of};
@@ -156,14 +156,12 @@ impl JacobianPanel {
         let (legend, hovered_legend) = ui.allocate_exact_size(vec2(ui.available_width(), LEGEND), Sense::hover());
         hovered_legend.on_hover_text(window::JACOBIAN_NORM.meaning);
         paint::legend(ui, ctx.theme, legend, model);
-        if let Some(selected_block) = selected_block.filter(|_| with_details) {
-            if let Some(row) = selected_block.0 {
+        let (row, column) = selected_block.unwrap_or_default();
+        if with_details && (selected_block.is_some() || !ctx.presentation.is_figure()) {
+            if let Some(row) = row {
                 factors::request(ctx, run, run.index_at(ctx.cursor_ns), model.jacobian.rows[row].factor);
             }
-            details::ui(ui, ctx, run, step, model, selected_block);
-        } else if with_details && !ctx.presentation.is_figure() {
-            let text = "Click a block: its rows, residuals and derivatives, and the feature or parameter in all panels";
-            ui.add(Label::new(RichText::new(text).color(ctx.theme.text_weak)).wrap());
+            details::ui(ui, ctx, run, step, model, (row, column));
         }
     }
 
