@@ -41,6 +41,9 @@ mod study_report;
 mod sweep;
 mod terminal;
 mod view;
+#[cfg(test)]
+#[cfg(feature = "gui")]
+mod view_tests;
 
 use clap::{CommandFactory as _, Parser as _};
 use dcvins::export::SourceError;

@@ -61,6 +61,16 @@ impl Machine {
         }
     }
 
+    /// A machine whose lists, settings and exported files are in one folder.
+    pub fn in_folder(folder: &Path) -> Self {
+        Self {
+            recent: RecentFiles::in_file(folder.join("recent")),
+            state: Some(folder.join("state")),
+            output: folder.join("output"),
+            samples: folder.join("samples"),
+        }
+    }
+
     fn kept(&self, name: &str) -> Option<String> {
         fs::read_to_string(self.state.as_ref()?.join(name)).ok()
     }
@@ -272,19 +282,10 @@ fn logs_in(folder: &Path) -> Vec<PathBuf> {
 mod tests {
     use super::*;
 
-    fn machine_in(folder: &Path) -> Machine {
-        Machine {
-            recent: RecentFiles::in_file(folder.join("recent")),
-            state: Some(folder.join("state")),
-            output: folder.join("output"),
-            samples: folder.join("samples"),
-        }
-    }
-
     #[test]
     fn panels_and_layouts_are_written_where_they_are_found_again() {
         let folder = tempfile::tempdir().unwrap();
-        let machine = machine_in(folder.path());
+        let machine = Machine::in_folder(folder.path());
         assert_eq!(machine.kept_layouts(), None);
         machine.keep_layouts("{}").unwrap();
         assert_eq!((machine.kept_layouts().as_deref(), machine.kept_settings()), (Some("{}"), None));
@@ -312,7 +313,7 @@ mod tests {
             fs::write(folder.path().join(name), "").unwrap();
         }
         fs::create_dir(folder.path().join("bags")).unwrap();
-        let machine = machine_in(folder.path());
+        let machine = Machine::in_folder(folder.path());
         let root = folder.path().to_string_lossy().into_owned();
         let names = |typed: String| -> Vec<String> {
             machine.complete(&typed).into_iter().map(|entry| entry.path.replacen(&root, "", 1)).collect()
@@ -330,7 +331,7 @@ mod tests {
     #[test]
     fn a_rig_is_written_if_it_can_be_read_and_never_over_another_file() {
         let folder = tempfile::tempdir().unwrap();
-        let (machine, path) = (machine_in(folder.path()), folder.path().join("yard.rig.yaml"));
+        let (machine, path) = (Machine::in_folder(folder.path()), folder.path().join("yard.rig.yaml"));
         let sample = include_str!("../../sample_logs/garden.rig.yaml");
         let problem = machine.write_rig(&path, &sample.replace("gravity", "gravitation")).unwrap_err();
         assert!(problem.contains("gravit") && !path.exists(), "{problem}");
@@ -343,7 +344,7 @@ mod tests {
     #[test]
     fn a_motion_is_written_once_and_read_again() {
         let folder = tempfile::tempdir().unwrap();
-        let machine = machine_in(folder.path());
+        let machine = Machine::in_folder(folder.path());
         let path = folder.path().join("plans/motion.csv");
         let mut motion = MotionSplines::at_rest(&[0.1], 8.0, 16);
         motion.set_point(0, 9, 0.4);

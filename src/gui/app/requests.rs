@@ -47,6 +47,8 @@ impl App {
         match self.desktop.write_session(&log.recording().log_stem(), &text) {
             Ok(path) => {
                 self.departure.saved = Work::of(log.as_ref());
+                self.desktop.remember_log(&path);
+                self.state.status.recent_logs = self.desktop.recent_logs();
                 self.state.notices.inform(format!("Session saved (opens like a log):\n{}", path.display()));
                 true
             }
