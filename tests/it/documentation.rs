@@ -298,3 +298,26 @@ fn paths_of_the_map_are_read_with_their_names() {
     check("```sh\ncargo test `a.rs`\n```\n`b.rs`", &[("b.rs", &[])]);
     assert!(has_word("fn step(&self)", "step") && !has_word("fn steps(my_step: f64)", "step"));
 }
+
+/// The flights of the README are measured in hours; their errors are those of the table in docs/accuracy.md.
+#[test]
+fn the_accuracy_of_the_readme_is_the_one_of_the_measured_table() {
+    let read = |path: &str| fs::read_to_string(root().join(path)).unwrap();
+    let (readme, measured) = (read("README.md"), read("docs/accuracy.md"));
+    let cells = |line: &str| -> Vec<String> {
+        let inner = line.trim().trim_matches('|');
+        inner.split('|').map(|cell| cell.trim().to_owned()).collect()
+    };
+    let mut flights = 0;
+    for row in readme.lines().filter(|line| line.starts_with("| T")).map(cells) {
+        let same = |line: &&str| line.starts_with(&format!("| {} |", row[0]));
+        let known = measured.lines().find(same).unwrap_or_else(|| panic!("docs/accuracy.md has no row '{}'", row[0]));
+        let known: Vec<String> =
+            cells(known).iter().filter_map(|cell| Some(cell.split(' ').next()?.to_owned())).collect();
+        for error in row[1..].iter().filter(|cell| !cell.is_empty()) {
+            assert!(known.contains(error), "{}: {error} is not in docs/accuracy.md: {known:?}", row[0]);
+        }
+        flights += 1;
+    }
+    assert_eq!(flights, 4);
+}
