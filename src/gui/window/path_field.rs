@@ -19,6 +19,8 @@ pub(in crate::gui) struct PathField {
     desktop: Option<Arc<dyn Desktop>>,
     typed: String,
     chosen: Option<usize>,
+    /// True from the first focus on: a list that hid again would move what is below it during a click.
+    lists: bool,
     completed: Option<(String, Vec<PathEntry>)>,
 }
 
@@ -87,6 +89,8 @@ impl PathField {
                 opened = Some(self.typed.trim().to_owned());
             }
         });
+        self.lists |= focused || focus || !self.typed.is_empty();
+        let shown = if self.lists { shown } else { &[] };
         ScrollArea::vertical().max_height(height).auto_shrink([false, true]).show(ui, |ui| {
             for (number, entry) in shown.iter().enumerate() {
                 let text = if entry.folder { format!("📁 {}", entry.path) } else { entry.path.clone() };
@@ -100,7 +104,7 @@ impl PathField {
                     }
                 }
             }
-            if entries.len() > shown.len() {
+            if self.lists && entries.len() > shown.len() {
                 let text = format!("{} more", entries.len() - shown.len());
                 ui.label(RichText::new(text).small().color(theme.text_weak));
             }
