@@ -40,6 +40,7 @@ pub struct Disturbances {
     pub spin: Option<[f64; 3]>,
     pub vibration: Option<Vibration>,
     pub gimbal_vibration: Option<Vibration>,
+    pub gimbal_ripple: Option<Vibration>,
     pub gimbal_imu_error: [f64; 2],
     /// Faults that the corrections of a fork undo, in the order of these corrections.
     pub faults: Vec<Fault>,
@@ -230,6 +231,14 @@ impl Disturbances {
             "HZ,RAD/S,M/S²",
             "the same in the IMU on the gimbal (`--gimbal-imu`), with phases of its own",
             |it| &mut it.gimbal_vibration,
+            &[1.0..=1000.0, 0.0..=100.0, 0.0..=1000.0],
+        ),
+        key(
+            "gimbal-ripple",
+            "HZ,RAD/S,M/S²",
+            "ripple of three servos in the IMU on the gimbal, which has no filter: frequency, which wanders by 0.2 %, \
+             and amplitudes of angular rate and specific force; beyond half the IMU's rate it is aliased",
+            |it| &mut it.gimbal_ripple,
             &[1.0..=1000.0, 0.0..=100.0, 0.0..=1000.0],
         ),
         key(

@@ -27,6 +27,7 @@ pub(crate) mod stream {
     pub(crate) const GIMBAL_IMU: u64 = 14;
     pub(crate) const GIMBAL_VIBRATION: u64 = 15;
     pub(crate) const GIMBAL_IMU_AXES: u64 = 16;
+    pub(crate) const GIMBAL_RIPPLE: u64 = 17;
 }
 
 /// Time from an IMU sample to the encoder reading.

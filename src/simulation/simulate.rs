@@ -24,7 +24,7 @@ use super::rig_of_file::rig_as_truth;
 use super::route::Mirrored;
 use super::scenario::{Scenario, ScenarioOptions, gravity_m_per_s2, stream};
 use super::trajectory::{AIR_DRAG_PER_S, Trajectory, VehicleLimits};
-use super::vibration::shake;
+use super::vibration::{ripple, shake};
 use super::world;
 use crate::files::output::OutputSet;
 use crate::flight_log::{LogError, LogWriter, LogWriterOptions, MessageTimes, Odometry};
@@ -186,6 +186,9 @@ fn fly_scenario(options: &SimulationOptions, name: &str) -> Result<Scenario, Sim
     }
     if let (Some(vibration), Some(record)) = (&options.disturbances.gimbal_vibration, &mut scenario.gimbal_imu_record) {
         shake(record, &scenario.trajectory, vibration, &mut random(stream::GIMBAL_VIBRATION));
+    }
+    if let (Some(vibration), Some(record)) = (&options.disturbances.gimbal_ripple, &mut scenario.gimbal_imu_record) {
+        ripple(record, vibration, &mut random(stream::GIMBAL_RIPPLE));
     }
     if let Some(vibration) = &options.disturbances.vibration {
         shake(&mut scenario.imu_record, &scenario.trajectory, vibration, &mut random(stream::VIBRATION));

@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use super::kind::FactorLabel;
 use crate::estimator::state::estimate::Estimate;
 use crate::estimator::state::frame::Frame;
+use crate::estimator::state::gimbal_imu_noise::GimbalImuNoise;
 use crate::estimator::state::layout::Layout;
 
 /// A factor of the least-squares problem: whitened residuals with their derivatives by columns of the layout.
@@ -83,6 +84,7 @@ pub(crate) struct Point<'a> {
     pub(crate) frames: &'a [Frame],
     /// Gravity in the world frame, in m/s².
     pub(crate) gravity_in_world: &'a Vector3<f64>,
+    pub(crate) gimbal_imu_noise: GimbalImuNoise,
     /// Values x at which residuals are evaluated.
     pub(crate) at: &'a Estimate,
     /// Values at which derivatives are evaluated.

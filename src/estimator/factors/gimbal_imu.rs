@@ -17,6 +17,7 @@ use crate::estimator::state::calibrations::MAIN;
 use crate::estimator::state::frame::InformedMotion;
 use crate::estimator::state::frame_state::FrameState;
 use crate::estimator::state::gimbal_imu::GimbalImuMount;
+use crate::estimator::state::gimbal_imu_noise::AxisSquares;
 use crate::estimator::state::layout::{POSE, VELOCITY_BIAS};
 use crate::estimator::state::navigation::{Matrix15, NavigationState, Vector15};
 use crate::sensors::ImuSample;
@@ -70,7 +71,8 @@ pub(crate) struct GimbalImuFactor<'a> {
     motion: &'a InformedMotion,
     /// First and last sample of the interval.
     ends: [&'a ImuSample; 2],
-    information: &'a Matrix15,
+    /// Square-root information with the measured noise.
+    information: Matrix15,
     gravity_in_world: &'a Vector3<f64>,
     states: &'a GimbalImuStates,
     /// First columns of pose and joints, and of velocity and biases, of both frames.
@@ -96,12 +98,31 @@ impl<'a> GimbalImuFactor<'a> {
             slot,
             motion,
             ends: [motion.samples().first()?, motion.samples().last()?],
-            information: motion.information()?,
+            information: point.gimbal_imu_noise.scaled(motion.information()?),
             gravity_in_world: point.gravity_in_world,
             states,
             columns: [slot - 1, slot].map(|slot| (layout.pose(slot).start, layout.gimbal_imu(slot).start)),
             calibration: layout.calibration().start + point.at.calibration.columns(MAIN).start,
         })
+    }
+
+    /// Squared residuals by axis of the frames before `slots`, in variances of the rig: their mean, or the square of their
+    /// sum per interval if that is larger, as with errors that last longer than an interval. `None` without samples.
+    pub(crate) fn axis_squares(point: &Point<'_>, slots: usize) -> Option<AxisSquares> {
+        let states = GimbalImuStates::new(point, slots, false)?;
+        let (mut sums, mut squares) = (Vector15::zeros(), Vector15::zeros());
+        let mut count = 0;
+        for factor in (1..slots).filter_map(|slot| GimbalImuFactor::of(point, &states, slot)) {
+            let [from, to] = factor.bounds(&states.current);
+            let residual = residual(factor.motion, &from, &to, factor.gravity_in_world, None);
+            let whitened = factor.motion.information()? * residual;
+            sums += whitened;
+            squares += whitened.component_mul(&whitened);
+            count += 1;
+        }
+        let variances = squares.zip_map(&sums, |square, sum: f64| square.max(sum * sum)) / f64::from(count);
+        let axes = |row: usize| variances.fixed_rows::<3>(row).into_owned();
+        (count > 0).then(|| [axes(0), axes(3).sup(&axes(6))])
     }
 
     /// States at the times of the measurements that bound the interval.

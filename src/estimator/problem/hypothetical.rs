@@ -17,6 +17,7 @@ use crate::estimator::state::columns::{ColumnBlock, ColumnGroup, FrameId};
 use crate::estimator::state::estimate::Estimate;
 use crate::estimator::state::frame::{Frame, layout};
 use crate::estimator::state::frame_state::{FrameState, Rates};
+use crate::estimator::state::gimbal_imu_noise::GimbalImuNoise;
 use crate::estimator::state::given_chain::GivenSigmas;
 use crate::estimator::state::navigation::{GimbalImuState, ImuBias, NavigationState};
 use crate::estimator::state::preintegration::Preintegration;
@@ -131,6 +132,7 @@ impl HypotheticalWindow {
             layout,
             cameras: vec![CameraFactors { visual, tracks: &tracks, columns: layout.calibration() }],
             gravity_in_world: self.gravity_in_world,
+            gimbal_imu_noise: GimbalImuNoise::OF_RIG,
             frames: &frames,
             prior: None,
             start: None,

@@ -18,6 +18,7 @@ use crate::estimator::state::camera_pose::CameraMaps;
 use crate::estimator::state::camera_view::{CameraView, Track};
 use crate::estimator::state::estimate::Estimate;
 use crate::estimator::state::frame::Frame;
+use crate::estimator::state::gimbal_imu_noise::GimbalImuNoise;
 use crate::estimator::state::layout::Layout;
 use crate::optimization::Landmark;
 
@@ -35,6 +36,7 @@ pub(crate) struct Problem<'a> {
     /// Each camera has a separate visual system of its features, with their observations by the other camera of its pair.
     pub(crate) cameras: Vec<CameraFactors<'a>>,
     pub(crate) gravity_in_world: Vector3<f64>,
+    pub(crate) gimbal_imu_noise: GimbalImuNoise,
     pub(crate) frames: &'a [Frame],
     pub(crate) prior: Option<&'a Prior>,
     pub(crate) start: Option<&'a StartPrior>,
@@ -87,6 +89,7 @@ impl Problem<'_> {
             layout: self.layout,
             frames: self.frames,
             gravity_in_world: &self.gravity_in_world,
+            gimbal_imu_noise: self.gimbal_imu_noise,
             at: estimate,
             linearized,
         }

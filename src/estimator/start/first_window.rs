@@ -12,6 +12,7 @@ use crate::estimator::state::calibrations::{Calibrations, MAIN};
 use crate::estimator::state::earlier_pass::BiasPrior;
 use crate::estimator::state::frame::Frame;
 use crate::estimator::state::frame_state::{FrameState, Rates};
+use crate::estimator::state::gimbal_imu_noise::GimbalImuNoise;
 use crate::estimator::state::navigation::{ImuBias, NavigationState};
 use crate::estimator::state::preintegration::Preintegration;
 use crate::estimator::step_input::StepInput;
@@ -125,7 +126,15 @@ impl<'a> FirstWindow<'a> {
                 .map(|_| [options.gyroscope_bias_sigma, options.accelerometer_bias_sigma]),
         };
         let loss_scales = vec![LossScale::default(); calibration.cameras()];
-        let state = WindowState { frames, features, calibration, prior: None, start: Some(start), loss_scales };
+        let state = WindowState {
+            frames,
+            features,
+            calibration,
+            prior: None,
+            start: Some(start),
+            loss_scales,
+            gimbal_imu_noise: GimbalImuNoise::default(),
+        };
         Some(Self { solution, window: SlidingWindow::new(state), observed })
     }
 

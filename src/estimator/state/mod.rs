@@ -14,6 +14,7 @@ pub(crate) mod estimate;
 pub(crate) mod frame;
 pub(crate) mod frame_state;
 pub(crate) mod gimbal_imu;
+pub(crate) mod gimbal_imu_noise;
 pub(crate) mod given_chain;
 pub(crate) mod imu_calibration;
 pub(crate) mod imu_errors;

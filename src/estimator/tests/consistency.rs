@@ -4,6 +4,7 @@ use super::fixture;
 use crate::estimator::config::{EstimatorConfig, EstimatorOptions};
 use crate::estimator::factors::FactorKind;
 use crate::estimator::report::ResidualSummary;
+use crate::estimator::state::gimbal_imu_noise::GimbalImuNoise;
 use crate::estimator::window::consistency::ConsistencyMonitor;
 use crate::gimbal::Parameterization;
 use crate::simulation::{SyntheticOptions, synthetic_tracks};
@@ -23,7 +24,8 @@ fn reported(mean_squares: impl IntoIterator<Item = f64>) -> Vec<usize> {
     let mut watch = ConsistencyMonitor::default();
     let (mut reported, mut first) = (Vec::new(), None);
     for (step, value) in mean_squares.into_iter().enumerate() {
-        let warnings = watch.observe(step as i64 * 50_000_000, &encoder(value), &config, Vec::new);
+        let warnings =
+            watch.observe(step as i64 * 50_000_000, (&encoder(value), &GimbalImuNoise::OF_RIG), &config, Vec::new);
         if let [warning] = warnings.as_slice() {
             let text = warning.to_string();
             assert!(text.starts_with("Encoder readings inconsistent"), "{text}");
@@ -58,7 +60,9 @@ fn inconsistent_residuals_warn_after_four_seconds_until_they_end() {
 fn an_inconsistency_without_a_suspect_names_no_cause() {
     let mut watch = ConsistencyMonitor::default();
     let config = config();
-    let warning = (0..100).find_map(|step| watch.observe(step * 50_000_000, &encoder(5.0), &config, Vec::new).pop());
+    let warning = (0..100).find_map(|step| {
+        watch.observe(step * 50_000_000, (&encoder(5.0), &GimbalImuNoise::OF_RIG), &config, Vec::new).pop()
+    });
     let cause = warning.unwrap().cause;
     assert!(cause.starts_with("cause unknown") && !cause.contains("try "), "{cause}");
 }

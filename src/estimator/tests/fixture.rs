@@ -15,6 +15,7 @@ use crate::estimator::state::calibrations::MAIN;
 use crate::estimator::state::estimate::Estimate;
 use crate::estimator::state::frame::{Frame, layout};
 use crate::estimator::state::frame_state::{FrameState, Rates};
+use crate::estimator::state::gimbal_imu_noise::GimbalImuNoise;
 use crate::estimator::state::navigation::{ImuBias, NavigationState};
 use crate::estimator::state::preintegration::Preintegration;
 use crate::estimator::window::features::ActiveTracks;
@@ -351,7 +352,15 @@ fn window_of(flight: &SyntheticFlight, further: &[&SyntheticFlight], config: Est
         gimbal_bias_sigmas: Some([0.02, 0.5]),
     };
     let loss_scales = vec![LossScale::default(); calibration.cameras()];
-    let mut window = WindowState { frames, features, calibration, prior: None, start: Some(start), loss_scales };
+    let mut window = WindowState {
+        frames,
+        features,
+        calibration,
+        prior: None,
+        start: Some(start),
+        loss_scales,
+        gimbal_imu_noise: GimbalImuNoise::OF_RIG,
+    };
     window.triangulate_new(&setup);
     assert!(window.active_tracks().iter().all(|active| active.ids.len() > 20), "enough landmarks");
     TestWindow { setup, window }

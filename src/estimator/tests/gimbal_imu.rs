@@ -14,7 +14,7 @@ use crate::estimator::state::calibrations::MAIN;
 use crate::estimator::state::estimate::Estimate;
 use crate::estimator::state::navigation::{ImuBias, NavigationState};
 use crate::estimator::state::preintegration::Preintegration;
-use crate::geometry::{RigidTransform, so3, wrap_angle};
+use crate::geometry::{RigidTransform, seconds_from_ns, so3, wrap_angle};
 use crate::gimbal::{ParameterNames, Parameterization};
 use crate::sensors::ImuNoise;
 use crate::simulation::{SyntheticFlight, SyntheticOptions, synthetic_tracks};
@@ -241,4 +241,22 @@ fn derivatives_of_the_second_imu_are_those_at_the_current_estimate() {
         let error = (rows.column(column) - &numeric).amax();
         assert!(error < 1e-4 * numeric.amax().max(1.0), "column {column}: {error} of {}", numeric.amax());
     }
+}
+
+/// Ripple of 200.3 Hz that an IMU without a filter samples at 200 Hz: 0.3 Hz in its samples.
+#[test]
+fn a_second_imu_with_aliased_vibration_is_named_and_does_little_harm() {
+    let mut flight = synthetic_tracks(&options(7));
+    for sample in flight.frames.iter_mut().flat_map(|frame| &mut frame.gimbal_imu) {
+        let phase = std::f64::consts::TAU * 200.3 * seconds_from_ns(sample.stamp_ns);
+        sample.angular_velocity_rad_per_s += Vector3::new(0.05, 0.1, -0.05) * phase.sin();
+        sample.specific_force_m_per_s2 += Vector3::new(1.0, -0.5, 2.0) * phase.cos();
+    }
+    let (_, reports) = run_flight(&flight.frames, config(&flight));
+    let named = |report: &StepReport| report.warnings.iter().any(|warning| warning.cause.starts_with("vibration"));
+    assert!(reports.iter().any(named) && named(reports.last().unwrap()));
+    let (with_m, with_rad, ..) = run(&flight, config(&flight));
+    let (without_m, without_rad, ..) = run(&flight, EstimatorConfig { gimbal_imu: None, ..config(&flight) });
+    assert!(with_m < 1.15 * without_m, "{with_m} m with it, {without_m} m without");
+    assert!(with_rad < 1.15 * without_rad, "{with_rad} rad with it, {without_rad} rad without");
 }

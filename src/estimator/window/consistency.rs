@@ -8,6 +8,7 @@ use super::column_groups::SuspectedParameter;
 use crate::estimator::config::EstimatorConfig;
 use crate::estimator::factors::FactorKind;
 use crate::estimator::report::{ResidualSummary, StepWarning};
+use crate::estimator::state::gimbal_imu_noise::GimbalImuNoise;
 use crate::geometry::seconds_from_ns;
 use crate::gimbal::{ParameterPart, Quantity};
 
@@ -18,6 +19,9 @@ const AVERAGED_NS: i64 = 4_000_000_000;
 const SAMPLED_NS: i64 = 250_000_000;
 /// Smallest change of χ² at which a sensor parameter is named as cause of an inconsistency: five standard deviations.
 const SIGNIFICANT_CHI2: f64 = 25.0;
+/// As [`SIGNIFICANT_CHI2`] for an IMU on the gimbal with errors that last longer than a window, as of aliased vibration:
+/// such errors reach 60 in 4 s, axes that are off by 1.4° with a time offset of 10 ms 1,000.
+const SIGNIFICANT_CHI2_OF_NOISY: f64 = 200.0;
 /// Hysteresis: a warning ends when the mean falls to this fraction of its limit.
 const RELEASE: f64 = 0.8;
 
@@ -32,8 +36,8 @@ struct MonitoredFactor {
 
 /// Consistent encoder readings have χ²/dof 1. Most rows of the prior are fitted, so its χ²/dof is 0.1 to 0.45
 /// (simulated and real logs) with a correct model; a camera time offset of 10 ms raises it to 2, an encoder time offset
-/// of 20 ms to 1.2. Most rows of the gimbal's IMU are fitted, too: their χ²/dof stays below 0.5 with a correct model; axes
-/// that are off by 1.4° and a time offset of 10 ms raise it to 0.9.
+/// of 20 ms to 1.2. Of the gimbal's IMU it is the variance of the noisiest axis relative to the rig's: 1 to 4.5 with a
+/// correct model, most with the chain of the first windows; axes that are off by 1.4° and a time offset of 10 ms raise it to 80.
 const MONITORED: [MonitoredFactor; 3] = [
     MonitoredFactor {
         factor: FactorKind::Encoder,
@@ -47,7 +51,7 @@ const MONITORED: [MonitoredFactor; 3] = [
     },
     MonitoredFactor {
         factor: FactorKind::GimbalImu,
-        limit: 0.6,
+        limit: 9.0,
         inconsistency: "IMU on the gimbal inconsistent with images, IMU and joint angles",
     },
 ];
@@ -93,7 +97,7 @@ impl ConsistencyMonitor {
     pub(crate) fn observe(
         &mut self,
         stamp_ns: i64,
-        residuals: &[ResidualSummary],
+        (residuals, gimbal_imu): (&[ResidualSummary], &GimbalImuNoise),
         config: &EstimatorConfig,
         scores: impl Fn() -> Vec<SuspectedParameter>,
     ) -> Vec<StepWarning> {
@@ -111,8 +115,14 @@ impl ConsistencyMonitor {
         }
         let mut warnings = Vec::new();
         for (monitored, mean) in MONITORED.iter().zip(&mut self.means) {
-            let summary = residuals.iter().find(|summary| summary.factor == monitored.factor);
-            let Some(mean_square) = summary.and_then(ResidualSummary::mean_square) else { continue };
+            let mean_square = match monitored.factor {
+                FactorKind::GimbalImu => gimbal_imu.largest_variance(),
+                factor => {
+                    let summary = residuals.iter().find(|summary| summary.factor == factor);
+                    summary.and_then(ResidualSummary::mean_square)
+                }
+            };
+            let Some(mean_square) = mean_square else { continue };
             mean.take(mean_square, stamp_ns - last_ns);
             let limit = if mean.reported.is_some() { RELEASE * monitored.limit } else { monitored.limit };
             let inconsistent = mean.over_ns >= AVERAGED_NS && mean.value > limit;
@@ -122,7 +132,11 @@ impl ConsistencyMonitor {
                 continue;
             };
             let suspected = &self.suspected;
-            let cause = mean.cause.get_or_insert_with(|| cause(suspected, config));
+            let found = || match monitored.factor {
+                FactorKind::GimbalImu => cause_of_gimbal_imu(suspected, gimbal_imu, config),
+                _ => cause(suspected, config),
+            };
+            let cause = mean.cause.get_or_insert_with(found);
             warnings.push(StepWarning {
                 factor: monitored.factor,
                 inconsistency: monitored.inconsistency,
@@ -164,6 +178,22 @@ fn cause(suspected: &[SuspectedParameter], config: &EstimatorConfig) -> String {
     format!(
         "intrinsics of {camera} inconsistent with its images (another {intrinsics} explains the residuals better than a time \
          offset or a readout does): try intrinsics=on"
+    )
+}
+
+/// As [`cause`], of an IMU on the gimbal that is noisier than in the rig: without a parameter that explains the windows far
+/// better, its errors are vibration.
+fn cause_of_gimbal_imu(suspected: &[SuspectedParameter], noise: &GimbalImuNoise, config: &EstimatorConfig) -> String {
+    if suspected.iter().any(|it| it.chi2() > SIGNIFICANT_CHI2_OF_NOISY) {
+        return cause(suspected, config);
+    }
+    let [gyroscope, accelerometer] = noise.factors().map(|factors| factors.map(|it| format!("{it:.0}")));
+    let text = |factors: &[String]| factors.join(", ");
+    format!(
+        "vibration, which its sample rate does not resolve, as of servos: it has less weight, by a noise of the gyroscope \
+         of {} times the rig's and of the accelerometer of {} times (x, y, z); filter or damp it, or sample it faster",
+        text(gyroscope.as_slice()),
+        text(accelerometer.as_slice()),
     )
 }
 

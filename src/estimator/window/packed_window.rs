@@ -7,6 +7,7 @@ use crate::estimator::factors::start_prior::StartPrior;
 use crate::estimator::state::calibrations::Calibrations;
 use crate::estimator::state::frame::{Frame, InformedMotion, Stationary};
 use crate::estimator::state::frame_state::FrameState;
+use crate::estimator::state::gimbal_imu_noise::GimbalImuNoise;
 use crate::estimator::state::imu_errors::ImuErrors;
 use crate::estimator::state::navigation::ImuBias;
 use crate::estimator::state::preintegration::Preintegration;
@@ -29,6 +30,7 @@ pub(crate) struct PackedWindow {
     prior: Option<PackedPrior>,
     start: Option<StartPrior>,
     loss_scales: Vec<LossScale>,
+    gimbal_imu_noise: GimbalImuNoise,
     monitors: Monitors,
 }
 
@@ -96,6 +98,7 @@ impl PackedWindow {
             prior: state.prior.as_ref().map(PackedPrior::new),
             start: state.start.clone(),
             loss_scales: state.loss_scales.clone(),
+            gimbal_imu_noise: state.gimbal_imu_noise,
             monitors: window.monitors.clone(),
         }
     }
@@ -114,6 +117,7 @@ impl PackedWindow {
                 prior: self.prior.as_ref().map(PackedPrior::unpacked),
                 start: self.start.clone(),
                 loss_scales: self.loss_scales.clone(),
+                gimbal_imu_noise: self.gimbal_imu_noise,
             },
             monitors: self.monitors.clone(),
         }

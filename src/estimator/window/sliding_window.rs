@@ -74,7 +74,12 @@ impl SlidingWindow {
         report.times.optimize_ms = optimize_ms;
         let marginalizing_ms = setup.clock_ms();
         let scores = || self.state.sensor_scores(setup);
-        report.warnings = self.monitors.consistency.observe(report.stamp_ns, &report.residuals, &setup.config, scores);
+        report.warnings = self.monitors.consistency.observe(
+            report.stamp_ns,
+            (&report.residuals, &self.state.gimbal_imu_noise),
+            &setup.config,
+            scores,
+        );
         self.state.drop_rejected(&solved, &setup.config.options, &mut events);
         events.extend(self.switch_near_singularity(setup));
         self.state.drop_or_marginalize_frame(setup, &mut events);

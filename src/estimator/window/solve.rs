@@ -6,6 +6,7 @@ use super::features::ActiveTracks;
 use super::setup::Setup;
 use super::window_state::WindowState;
 use crate::estimator::config::EstimatorOptions;
+use crate::estimator::factors::gimbal_imu::GimbalImuFactor;
 use crate::estimator::factors::reprojection;
 use crate::estimator::problem::information_gain::InformationGain;
 use crate::estimator::problem::linearization::Linearization;
@@ -15,6 +16,7 @@ use crate::estimator::report::{Event, EventKind};
 use crate::estimator::state::camera_view::TrackObservation;
 use crate::estimator::state::columns::FrameId;
 use crate::estimator::state::estimate::Estimate;
+use crate::estimator::state::gimbal_imu_noise::AxisSquares;
 use crate::geometry::median;
 
 /// Reprojection residuals in pixels, by track and observation; `None` behind the camera.
@@ -27,6 +29,8 @@ pub(crate) struct SolvedWindow {
     pub(crate) cameras: Vec<ActiveTracks>,
     pub(crate) solution: Solution,
     pub(crate) checks: Vec<TrackChecks>,
+    /// Residuals of the IMU on the gimbal, `None` without one.
+    pub(crate) gimbal_imu_squares: Option<AxisSquares>,
 }
 
 #[derive(Clone, Debug)]
@@ -49,6 +53,8 @@ impl WindowState {
         let before = track_residuals(&problem, &start);
         let solution = solver::solve(&problem, start, limits);
         let after = track_residuals(&problem, &solution.estimate);
+        let point = problem.point(&solution.estimate, &solution.estimate);
+        let gimbal_imu_squares = GimbalImuFactor::axis_squares(&point, self.frames.len());
 
         for (frame, state) in self.frames.iter_mut().zip(&solution.estimate.frames) {
             frame.state = state.clone();
@@ -70,7 +76,7 @@ impl WindowState {
                 residuals_after,
             })
             .collect();
-        SolvedWindow { cameras, solution, checks }
+        SolvedWindow { cameras, solution, checks, gimbal_imu_squares }
     }
 
     /// Linearization at the final estimate (rows of the measurements and of the priors), and the
@@ -99,6 +105,9 @@ impl WindowState {
         let sigma_px = setup.config.options.pixel_sigma_px;
         for (scale, checks) in self.loss_scales.iter_mut().zip(&solved.checks) {
             scale.follow(median_length(std::iter::once(&checks.residuals_after)) / sigma_px, interval_s);
+        }
+        if let Some(squares) = &solved.gimbal_imu_squares {
+            self.gimbal_imu_noise.follow(squares, interval_s);
         }
     }
 

@@ -12,6 +12,7 @@ use crate::estimator::state::calibrations::{Calibrations, MAIN};
 use crate::estimator::state::camera_view::CameraView;
 use crate::estimator::state::estimate::Estimate;
 use crate::estimator::state::frame;
+use crate::estimator::state::gimbal_imu_noise::GimbalImuNoise;
 use crate::gimbal::Parameterization;
 use crate::optimization::Landmark;
 
@@ -28,6 +29,7 @@ pub(crate) struct WindowState {
     pub(crate) start: Option<StartPrior>,
     /// Scales of the robust loss by camera.
     pub(crate) loss_scales: Vec<LossScale>,
+    pub(crate) gimbal_imu_noise: GimbalImuNoise,
 }
 
 impl WindowState {
@@ -61,6 +63,7 @@ impl WindowState {
             layout,
             cameras: (0..self.calibration.cameras()).map(factors).collect(),
             gravity_in_world: setup.gravity_in_world,
+            gimbal_imu_noise: self.gimbal_imu_noise,
             frames: &self.frames,
             prior: self.prior.as_ref(),
             start: self.start.as_ref(),

@@ -6,6 +6,7 @@ use crate::geometry::{seconds_from_ns, so3};
 use crate::log_check::clock_alignment::{
     OFFSET_TOLERANCE_S, ORIENTATION_TOLERANCE_RAD, RotationReference, align_clocks,
 };
+use crate::log_check::imu::spectrum::check_gimbal_vibration;
 use crate::log_check::report::{Area, Findings, ImageRotation, Measurement, Severity};
 use crate::log_check::statistics::{SIGNIFICANT_SIGMAS, median};
 use crate::log_check::survey::Survey;
@@ -20,6 +21,7 @@ const GRAVITY_TOLERANCE: f64 = 0.15;
 pub(crate) fn check_gimbal_imu(survey: &Survey, rig: &Rig, rotations: &[ImageRotation], findings: &mut Findings) {
     let Some(imu) = rig.gimbal_imu.as_ref().filter(|_| !survey.gimbal_imu.is_empty()) else { return };
     check_gravity(survey, rig, findings);
+    check_gimbal_vibration(&survey.gimbal_imu, findings);
     let camera = rig.cameras.iter().find(|camera| camera.mount == CameraMount::Gimbal);
     if let Some(camera) = camera.filter(|_| findings.can_compare(Measurement::Gyroscope)) {
         check_against_images(survey, imu, camera, rotations, findings);

@@ -11,7 +11,7 @@ use nalgebra::{Complex, Vector3};
 use crate::geometry::seconds_from_ns;
 use crate::log_check::report::{Area, Findings, Measurement, Severity};
 use crate::log_check::statistics::percentile;
-use crate::sensors::Rig;
+use crate::sensors::{ImuSample, Rig};
 
 /// Length of a segment in seconds, rounded to a power of two of samples: rotors change their speed over longer ones.
 const SEGMENT_S: f64 = 0.64;
@@ -229,7 +229,7 @@ pub(super) fn check_noise(spectra: &[Option<Spectrum>; 2], rig: Option<&Rig>, fi
     ];
     for ((measurement, name, given, unit), spectrum) in sensors.into_iter().zip(spectra) {
         let Some(spectrum) = spectrum else { continue };
-        report_vibration(name, spectrum, unit, findings);
+        report_vibration(name, spectrum, unit, "rotors", findings);
         // By a wrong unit, noise is wrong by the same factor.
         if let Some(given) = given.filter(|_| findings.can_compare(measurement)) {
             compare_density(name, spectrum, given, unit, findings);
@@ -237,8 +237,24 @@ pub(super) fn check_noise(spectra: &[Option<Spectrum>; 2], rig: Option<&Rig>, fi
     }
 }
 
+/// Reports frequencies and amplitudes of a vibration of the IMU on the gimbal.
+pub(crate) fn check_gimbal_vibration(samples: &[ImuSample], findings: &mut Findings) {
+    let of = |value: fn(&ImuSample) -> Vector3<f64>| -> Vec<(i64, Vector3<f64>)> {
+        samples.iter().map(|sample| (sample.stamp_ns, value(sample))).collect()
+    };
+    let sensors = [
+        ("gyroscope of the IMU on the gimbal", of(|it| it.angular_velocity_rad_per_s), "rad/s"),
+        ("accelerometer of the IMU on the gimbal", of(|it| it.specific_force_m_per_s2), "m/s²"),
+    ];
+    for (name, samples, unit) in sensors {
+        if let Some(spectrum) = Spectrum::of(&samples) {
+            report_vibration(name, &spectrum, unit, "servos", findings);
+        }
+    }
+}
+
 /// Reports frequencies and amplitudes of a vibration that exceeds the white noise.
-fn report_vibration(name: &str, spectrum: &Spectrum, unit: &str, findings: &mut Findings) {
+fn report_vibration(name: &str, spectrum: &Spectrum, unit: &str, source: &str, findings: &mut Findings) {
     let white_rms = spectrum.density * (3.0 * spectrum.rate_hz).sqrt();
     if spectrum.lines.is_empty() || spectrum.vibration_rms < VIBRATION_RATIO * white_rms {
         return;
@@ -250,8 +266,10 @@ fn report_vibration(name: &str, spectrum: &Spectrum, unit: &str, findings: &mut 
     let lines: Vec<String> = spectrum.lines.iter().map(line).collect();
     let evidence =
         format!("{:.3} {unit} RMS, white noise {white_rms:.3}: {}", spectrum.vibration_rms, lines.join(", "));
-    let remedy = "isolate the IMU from the rotors; the noise densities need not cover a vibration, which averages out \
-                  between two images unless it is clipped or aliased to a low frequency";
+    let remedy = format!(
+        "isolate the IMU from the {source}; the noise densities need not cover a vibration, which averages out between two \
+         images unless it is clipped or aliased to a low frequency"
+    );
     findings.add(Severity::Note, Area::Imu, format!("vibration on the {name}"), evidence, remedy);
 }
 

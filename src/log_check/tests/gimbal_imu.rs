@@ -6,7 +6,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::super::report::Findings;
 use super::super::survey::Survey;
-use super::{rate_at, rig_text};
+use super::{Noise, rate_at, rig_text};
 use crate::geometry::{ns_from_seconds, so3};
 use crate::log_check::gimbal::gimbal_imu::check_gimbal_imu;
 use crate::log_check::report::{ImageRotation, Severity};
@@ -30,10 +30,11 @@ fn rig() -> Rig {
 /// Survey of the samples, stamped `late_s` too late, and the rotations of the camera's images.
 fn flight(rig: &Rig, late_s: f64) -> (Survey, Vec<ImageRotation>) {
     let times = (0..).map(|index| f64::from(index) * SAMPLE_S).take_while(|time_s| *time_s < 12.0);
+    let mut noise = Noise(3);
     let samples = times.map(|time_s| ImuSample {
         stamp_ns: ns_from_seconds(time_s + late_s),
-        angular_velocity_rad_per_s: rate_at(time_s),
-        specific_force_m_per_s2: Vector3::new(0.0, 0.0, 9.81),
+        angular_velocity_rad_per_s: rate_at(time_s) + noise.vector() * 0.005,
+        specific_force_m_per_s2: Vector3::new(0.0, 0.0, 9.81) + noise.vector() * 0.05,
     });
     let mut survey = Survey::default();
     survey.gimbal_imu.extend(samples);
@@ -61,7 +62,7 @@ fn check(rig: &Rig, survey: &Survey, rotations: &[ImageRotation]) -> Vec<(Severi
     findings
         .list
         .into_iter()
-        .map(|finding| (finding.severity, format!("{}; {}", finding.title, finding.remedy)))
+        .map(|finding| (finding.severity, format!("{}; {}; {}", finding.title, finding.evidence, finding.remedy)))
         .collect()
 }
 
@@ -88,4 +89,24 @@ fn clock_axes_and_gravity_of_the_second_imu_are_checked() {
     weightless.gimbal_imu.iter_mut().for_each(|sample| sample.specific_force_m_per_s2 /= 9.81);
     let found = check(&rig, &weightless, &rotations);
     assert!(found.iter().any(|(severity, text)| *severity == Severity::Error && text.contains("gravity")));
+}
+
+#[test]
+fn vibration_of_its_servos_is_reported_with_the_frequency() {
+    let rig = rig();
+    let (mut survey, rotations) = flight(&rig, 0.0);
+    assert!(!check(&rig, &survey, &rotations).iter().any(|(_, text)| text.contains("vibration")));
+    for sample in &mut survey.gimbal_imu {
+        let phase = std::f64::consts::TAU * 60.0 * crate::geometry::seconds_from_ns(sample.stamp_ns);
+        sample.angular_velocity_rad_per_s.y += 0.2 * phase.sin();
+    }
+    let found = check(&rig, &survey, &rotations);
+    assert!(
+        found.iter().any(|(severity, text)| {
+            *severity == Severity::Note
+                && text.contains("gyroscope of the IMU on the gimbal")
+                && text.contains("at 60 Hz")
+        }),
+        "{found:?}"
+    );
 }
