@@ -3,8 +3,11 @@
 use egui::{ViewportBuilder, ViewportInfo, pos2};
 use serde::{Deserialize, Serialize};
 
-/// Size of the window in logical pixels before the first change; at the first start it is maximized.
+/// Size of the window in logical pixels where the size of the screen is unknown; at the first start it is maximized.
 const FIRST_SIZE: [f32; 2] = [1600.0, 900.0];
+/// Part of each side of the screen that a window takes at the first start where it is not maximized: without a window
+/// manager, or when it is restored.
+const FIRST_RATIO: f32 = 0.9;
 /// Minimum size in logical pixels.
 const MIN_SIZE: [f32; 2] = [640.0, 400.0];
 /// Number of frames after which a window is shown with its frame.
@@ -109,8 +112,16 @@ pub(super) fn inside_screen(window: PixelRect, screens: &[PixelRect]) -> Option<
     (inside != window).then_some(inside)
 }
 
-/// Moves a window that is partly outside of all screens; the screens may have changed since the last use.
-pub(super) fn move_inside_screen(window: &winit::window::Window) {
+/// Rectangle of a window at the first start, in the middle of its screen.
+pub(super) fn first_on_screen(screen: PixelRect) -> PixelRect {
+    let [left, top, width, height] = screen;
+    let part = |side: i32| (FIRST_RATIO * side as f32) as i32;
+    [left + (width - part(width)) / 2, top + (height - part(height)) / 2, part(width), part(height)]
+}
+
+/// Places a window: at the first start by the size of its screen, later only if it is partly outside of all screens, which
+/// may have changed since the last use.
+pub(super) fn place_on_screen(window: &winit::window::Window, is_first: bool) {
     use winit::dpi::{PhysicalPosition, PhysicalSize};
     // Wayland neither reports nor accepts a position.
     let Ok(position) = window.outer_position() else { return };
@@ -120,7 +131,11 @@ pub(super) fn move_inside_screen(window: &winit::window::Window) {
     };
     let screens: Vec<PixelRect> =
         window.available_monitors().map(|monitor| rect(monitor.position(), monitor.size())).collect();
-    if let Some([left, top, width, height]) = inside_screen(rect(position, window.outer_size()), &screens) {
+    let wanted = match screens.first() {
+        Some(screen) if is_first => Some(first_on_screen(*screen)),
+        _ => inside_screen(rect(position, window.outer_size()), &screens),
+    };
+    if let Some([left, top, width, height]) = wanted {
         // The size excludes the frame, which does not change.
         let frame = |outer: u32, inner: u32| i32::try_from(outer.saturating_sub(inner)).unwrap_or(0);
         let (outer, inner) = (window.outer_size(), window.inner_size());
@@ -166,6 +181,12 @@ mod tests {
         assert_eq!(moved([1900, -20, 1600, 900]), Some([1920, 0, 1366, 768]), "the smaller screen");
         assert_eq!(moved([9000, 9000, 800, 600]), Some([1120, 480, 800, 600]), "a screen that is gone");
         assert_eq!(inside_screen([9000, 9000, 800, 600], &[]), None, "no screen is known");
+    }
+
+    #[test]
+    fn the_first_window_is_in_the_middle_of_its_screen() {
+        assert_eq!(first_on_screen([0, 0, 3840, 2160]), [192, 108, 3456, 1944]);
+        assert_eq!(first_on_screen([1920, 0, 1000, 800]), [1970, 40, 900, 720]);
     }
 
     #[test]

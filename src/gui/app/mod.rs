@@ -39,7 +39,7 @@ use std::time::Duration;
 use egui::{CentralPanel, Frame, Ui, ViewportCommand, vec2};
 
 use self::departure::{Departure, Work};
-use self::kept_window::{KeptWindow, SHOWN_FRAMES, STORED_AFTER_S, WindowKeeper, move_inside_screen};
+use self::kept_window::{KeptWindow, SHOWN_FRAMES, STORED_AFTER_S, WindowKeeper, place_on_screen};
 pub use self::open_request::{OpenFailure, OpenLog, OpenProgress, OpenRequest, OpenedLog, RigQuestion};
 use self::opening::Opening;
 use self::opening_cursor::OpeningCursor;
@@ -403,7 +403,7 @@ impl App {
         } else if self.keeper.maximizes {
             ui.send_viewport_cmd(ViewportCommand::Maximized(true));
         } else {
-            move_inside_screen(window);
+            place_on_screen(window, false);
         }
     }
 

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use egui::{IconData, ViewportBuilder};
 use thiserror::Error;
 
-use super::kept_window::{KeptWindow, move_inside_screen};
+use super::kept_window::{KeptWindow, place_on_screen};
 use super::software_window::SoftwareWindow;
 use crate::gui::app::{App, OpenLog, OpenRequest, OpenStudy, PlayingLog};
 use crate::gui::desktop::Desktop;
@@ -52,7 +52,9 @@ pub fn run_window(options: WindowOptions) -> Result<(), WindowError> {
     if cfg!(target_os = "linux") && !["WAYLAND_DISPLAY", "WAYLAND_SOCKET", "DISPLAY"].into_iter().any(set) {
         return Err(WindowError::NoDisplay);
     }
-    let kept = KeptWindow::from_text(&options.desktop.kept_window().unwrap_or_default());
+    let kept = options.desktop.kept_window();
+    let is_first = kept.is_none();
+    let kept = KeptWindow::from_text(&kept.unwrap_or_default());
     let viewport = ViewportBuilder::default()
         .with_title("dcvins")
         // Name of the desktop entry, `assets/linux/dcvins.desktop`.
@@ -74,7 +76,7 @@ pub fn run_window(options: WindowOptions) -> Result<(), WindowError> {
             Box::new(move |creation| {
                 arrange_drawing(creation.wgpu_render_state.as_ref(), &creation.egui_ctx);
                 if let Some(window) = creation.winit_window() {
-                    move_inside_screen(window);
+                    place_on_screen(window, is_first);
                 }
                 let mut app =
                     App::new(options.open_log, options.desktop, options.theme).with_studies(options.open_study);
