@@ -1,6 +1,6 @@
 //! Alignment of the numbers of a column by spaces, for a font whose characters have one width.
 
-/// Aligns the texts of a column: the decimal points of their first numbers are below each other, then those of their
+/// Aligns the texts of a column: the decimal points of their first numbers are below each other, then the points of their
 /// second numbers, and so on; a unit after a space begins at one place, any other stays at its number. A text without a
 /// number is not changed.
 pub fn align_numbers<'t>(column: impl IntoIterator<Item = &'t mut String>) {

@@ -113,9 +113,7 @@ impl<'a> GimbalImuFactor<'a> {
         let (mut sums, mut squares) = (Vector15::zeros(), Vector15::zeros());
         let mut count = 0;
         for factor in (1..slots).filter_map(|slot| GimbalImuFactor::of(point, &states, slot)) {
-            let [from, to] = factor.bounds(&states.current);
-            let residual = residual(factor.motion, &from, &to, factor.gravity_in_world, None);
-            let whitened = factor.motion.information()? * residual;
+            let whitened = factor.motion.information()? * factor.residual();
             sums += whitened;
             squares += whitened.component_mul(&whitened);
             count += 1;
@@ -128,6 +126,12 @@ impl<'a> GimbalImuFactor<'a> {
     /// States at the times of the measurements that bound the interval.
     fn bounds(&self, at: &MountedStates) -> [NavigationState; 2] {
         [0, 1].map(|end| at.mount.shifted(&at.states[self.slot - 1 + end], self.ends[end], self.gravity_in_world))
+    }
+
+    /// Residual at the current values, not whitened.
+    fn residual(&self) -> Vector15 {
+        let [from, to] = self.bounds(&self.states.current);
+        residual(self.motion, &from, &to, self.gravity_in_world, None)
     }
 
     /// Derivatives at the linearization point: those by the pose of the IMU, carried on by the chain.
@@ -171,8 +175,7 @@ impl Factor for GimbalImuFactor<'_> {
     }
 
     fn rows<S: Sink>(&self, sink: &mut S) {
-        let [from, to] = self.bounds(&self.states.current);
-        let residual = self.information * residual(self.motion, &from, &to, self.gravity_in_world, None);
+        let residual = self.information * self.residual();
         let derivatives = self.states.linearized.as_ref().map(|(at, maps)| self.derivatives(at, maps));
         let blocks = derivatives.as_ref().map_or_else(Vec::new, |derivatives| self.blocks(derivatives));
         sink.add(self.label(), &WhitenedRows { residual: residual.as_slice(), blocks: &blocks, products: None });

@@ -12,14 +12,12 @@ use crate::estimator::state::calibrations::{Calibrations, MAIN};
 use crate::estimator::state::earlier_pass::BiasPrior;
 use crate::estimator::state::frame::Frame;
 use crate::estimator::state::frame_state::{FrameState, Rates};
-use crate::estimator::state::gimbal_imu_noise::GimbalImuNoise;
 use crate::estimator::state::navigation::{ImuBias, NavigationState};
 use crate::estimator::state::preintegration::Preintegration;
 use crate::estimator::step_input::StepInput;
 use crate::estimator::window::drop_or_marginalize_frame;
 use crate::estimator::window::features::{self, FeatureMap};
 use crate::estimator::window::frames::Frames;
-use crate::estimator::window::loss_scale::LossScale;
 use crate::estimator::window::setup::Setup;
 use crate::estimator::window::sliding_window::SlidingWindow;
 use crate::estimator::window::window_state::WindowState;
@@ -125,16 +123,7 @@ impl<'a> FirstWindow<'a> {
                 .as_ref()
                 .map(|_| [options.gyroscope_bias_sigma, options.accelerometer_bias_sigma]),
         };
-        let loss_scales = vec![LossScale::default(); calibration.cameras()];
-        let state = WindowState {
-            frames,
-            features,
-            calibration,
-            prior: None,
-            start: Some(start),
-            loss_scales,
-            gimbal_imu_noise: GimbalImuNoise::default(),
-        };
+        let state = WindowState::new(frames, features, calibration, start);
         Some(Self { solution, window: SlidingWindow::new(state), observed })
     }
 

@@ -20,33 +20,21 @@ const TIME_CONSTANT_S: f64 = 2.0;
 /// Squared residuals by axis of the IMU, in variances of the rig: of gyroscope and accelerometer.
 pub(crate) type AxisSquares = [Vector3<f64>; 2];
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct GimbalImuNoise {
-    /// Factors of the standard deviations of gyroscope and accelerometer by axis, at least 1.
-    factors: [Vector3<f64>; 2],
     /// Mean variances relative to the rig's, and the time over which they are averaged in seconds.
     variances: AxisSquares,
     averaged_s: f64,
 }
 
-impl Default for GimbalImuNoise {
-    fn default() -> Self {
-        Self { factors: [Vector3::repeat(FIRST); 2], variances: [Vector3::zeros(); 2], averaged_s: 0.0 }
-    }
-}
-
 impl GimbalImuNoise {
     /// The rig's noise, for predictions.
-    pub(crate) const OF_RIG: Self = Self {
-        factors: [Vector3::new(1.0, 1.0, 1.0); 2],
-        variances: [Vector3::new(0.0, 0.0, 0.0); 2],
-        averaged_s: 0.0,
-    };
+    pub(crate) const OF_RIG: Self = Self { variances: [Vector3::new(1.0, 1.0, 1.0); 2], averaged_s: TIME_CONSTANT_S };
 
     /// Square-root information of `[φ, p, v, b_g, b_a]` with this noise from the one with the rig's.
     pub(crate) fn scaled(&self, information: &Matrix15) -> Matrix15 {
         let mut scaled = *information;
-        let [gyroscope, accelerometer] = &self.factors;
+        let [gyroscope, accelerometer] = self.factors();
         for (rows, factors) in [gyroscope, accelerometer, accelerometer].into_iter().enumerate() {
             for axis in 0..3 {
                 scaled.column_mut(3 * rows + axis).scale_mut(factors[axis].recip());
@@ -57,16 +45,16 @@ impl GimbalImuNoise {
 
     /// Follows the mean squared residuals of a solved window for an interval in seconds.
     pub(crate) fn follow(&mut self, squares: &AxisSquares, interval_s: f64) {
+        let factors = self.factors();
         self.averaged_s = (self.averaged_s + interval_s).min(TIME_CONSTANT_S.max(interval_s));
         let ratio = interval_s / self.averaged_s;
-        let sensors = self.factors.iter_mut().zip(&mut self.variances).zip(squares).zip(FITTED);
-        for (((factors, variances), squares), fitted) in sensors {
+        for (((variances, factors), squares), fitted) in self.variances.iter_mut().zip(factors).zip(squares).zip(FITTED)
+        {
             for axis in 0..3 {
                 let variance = squares[axis] * (1.0 + fitted / factors[axis].powi(2));
                 if variance.is_finite() {
                     variances[axis] += (variance - variances[axis]) * ratio;
                 }
-                factors[axis] = variances[axis].max(1.0).sqrt();
             }
         }
     }
@@ -77,9 +65,12 @@ impl GimbalImuNoise {
         (self.averaged_s > 0.0).then_some(largest)
     }
 
-    /// Factors of the standard deviations of gyroscope and accelerometer by axis of the IMU.
+    /// Factors of the standard deviations of gyroscope and accelerometer by axis of the IMU, at least 1.
     pub(crate) fn factors(&self) -> [Vector3<f64>; 2] {
-        self.factors
+        if self.averaged_s == 0.0 {
+            return [Vector3::repeat(FIRST); 2];
+        }
+        self.variances.map(|variances| variances.map(|variance| variance.max(1.0).sqrt()))
     }
 }
 
@@ -93,7 +84,7 @@ mod tests {
         let mut noise = GimbalImuNoise::default();
         for _ in 0..20 * seconds {
             let fitted = |sensor: usize| {
-                noise.factors[sensor].map(|factor| ratio.powi(2) / (1.0 + FITTED[sensor] / factor.powi(2)))
+                noise.factors()[sensor].map(|factor| ratio.powi(2) / (1.0 + FITTED[sensor] / factor.powi(2)))
             };
             noise.follow(&[fitted(0), fitted(1)], 0.05);
         }

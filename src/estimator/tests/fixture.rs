@@ -21,7 +21,6 @@ use crate::estimator::state::preintegration::Preintegration;
 use crate::estimator::window::features::ActiveTracks;
 use crate::estimator::window::features::{self, FeatureMap};
 use crate::estimator::window::frames::Frames;
-use crate::estimator::window::loss_scale::LossScale;
 use crate::estimator::window::setup::Setup;
 use crate::estimator::window::window_state::WindowState;
 use crate::estimator::{DEFAULT_CHAIN_PRIOR, Estimator, StepInput};
@@ -351,16 +350,8 @@ fn window_of(flight: &SyntheticFlight, further: &[&SyntheticFlight], config: Est
         gyroscope_bias_sigma: Vector3::repeat(0.02),
         gimbal_bias_sigmas: Some([0.02, 0.5]),
     };
-    let loss_scales = vec![LossScale::default(); calibration.cameras()];
-    let mut window = WindowState {
-        frames,
-        features,
-        calibration,
-        prior: None,
-        start: Some(start),
-        loss_scales,
-        gimbal_imu_noise: GimbalImuNoise::OF_RIG,
-    };
+    let mut window = WindowState::new(frames, features, calibration, start);
+    window.gimbal_imu_noise = GimbalImuNoise::OF_RIG;
     window.triangulate_new(&setup);
     assert!(window.active_tracks().iter().all(|active| active.ids.len() > 20), "enough landmarks");
     TestWindow { setup, window }

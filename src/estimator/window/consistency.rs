@@ -187,13 +187,10 @@ fn cause_of_gimbal_imu(suspected: &[SuspectedParameter], noise: &GimbalImuNoise,
     if suspected.iter().any(|it| it.chi2() > SIGNIFICANT_CHI2_OF_NOISY) {
         return cause(suspected, config);
     }
-    let [gyroscope, accelerometer] = noise.factors().map(|factors| factors.map(|it| format!("{it:.0}")));
-    let text = |factors: &[String]| factors.join(", ");
+    let [gyroscope, accelerometer] = noise.factors().map(|it| format!("{:.0}, {:.0}, {:.0}", it.x, it.y, it.z));
     format!(
         "vibration, which its sample rate does not resolve, as of servos: it has less weight, by a noise of the gyroscope \
-         of {} times the rig's and of the accelerometer of {} times (x, y, z); filter or damp it, or sample it faster",
-        text(gyroscope.as_slice()),
-        text(accelerometer.as_slice()),
+         of {gyroscope} times the rig's and of the accelerometer of {accelerometer} times (x, y, z); filter or damp it, or sample it faster"
     )
 }
 

@@ -33,6 +33,13 @@ pub(crate) struct WindowState {
 }
 
 impl WindowState {
+    /// Window before the first solve, with a prior on its first frame; scales and noise have followed no residuals.
+    pub(crate) fn new(frames: Frames, features: Vec<FeatureMap>, calibration: Calibrations, start: StartPrior) -> Self {
+        let loss_scales = vec![LossScale::default(); calibration.cameras()];
+        let gimbal_imu_noise = GimbalImuNoise::default();
+        Self { frames, features, calibration, prior: None, start: Some(start), loss_scales, gimbal_imu_noise }
+    }
+
     /// Camera at the current estimate.
     pub(crate) fn view<'v>(&'v self, setup: &'v Setup, camera: usize) -> CameraView<'v> {
         let states: Vec<_> = self.frames.iter().map(|frame| frame.state.clone()).collect();

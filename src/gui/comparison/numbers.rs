@@ -74,17 +74,16 @@ pub(super) fn accuracy_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, scores: &Scor
             ui.label(text).on_hover_text(format!("{}\n{POSES_ONLY}", lane.source));
         }
         ui.end_row();
-        let rows = scores.rows();
-        let texts = rows.iter().map(|row| {
-            let mark = |run| if row.best() == Some(run) { " ✔" } else { "" };
+        let rows: Vec<_> = scores.rows().into_iter().map(|row| (row.best(), row)).collect();
+        let texts = rows.iter().map(|(best, row)| {
+            let mark = |run| if *best == Some(run) { " ✔" } else { "" };
             (0..row.values.len()).map(|run| format!("{}{}", row.text(run), mark(run))).collect()
         });
-        for (row, texts) in rows.iter().zip(aligned_rows(texts.collect())) {
-            let best = row.best();
+        for ((best, row), texts) in rows.iter().zip(aligned_rows(texts.collect())) {
             ui.label(RichText::new(&row.name).color(theme.text)).on_hover_text(row.meaning);
             ui.label(RichText::new(row.unit).color(theme.text_weak)).on_hover_text(row.meaning);
             for (run, text) in texts.into_iter().enumerate() {
-                let color = if best == Some(run) { theme.ok } else { theme.text_strong };
+                let color = if *best == Some(run) { theme.ok } else { theme.text_strong };
                 number_ui(ui, &text, color).on_hover_text(row.meaning);
             }
             ui.end_row();
@@ -155,17 +154,18 @@ fn table_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, number: usize, own: &str, c
             ui.label(RichText::new(term.name).small().color(theme.text_weak)).on_hover_text(term.meaning);
         }
         ui.end_row();
-        let found = ComparedQuantity::all().zip(&comparison.divergences);
-        let found: Vec<_> = found.filter_map(|(quantity, it)| Some((quantity, it, it.largest?))).collect();
-        let texts = found.iter().map(|(quantity, _, (largest, _))| {
-            let now = comparison.at(*quantity, ctx.cursor_ns);
-            [now, Some(*largest)].map(|apart| apart.map_or_else(|| "–".to_owned(), |it| difference_text(*quantity, it)))
+        let found = ComparedQuantity::all().zip(&comparison.divergences).filter(|(_, it)| it.largest.is_some());
+        let found: Vec<_> =
+            found.map(|(quantity, it)| (quantity, it, comparison.at(quantity, ctx.cursor_ns))).collect();
+        let texts = found.iter().map(|(quantity, divergence, apart)| {
+            let largest = divergence.largest.map(|(largest, _)| largest);
+            let text = |apart: Option<f64>| apart.map_or_else(|| "–".to_owned(), |it| difference_text(*quantity, it));
+            vec![text(*apart), text(largest)]
         });
-        let texts = aligned_rows(texts.map(Vec::from).collect());
-        for ((quantity, divergence, (largest, largest_ns)), texts) in found.into_iter().zip(texts) {
-            let Divergence { exact_ns, notable_ns, .. } = *divergence;
+        let texts = aligned_rows(texts.collect());
+        for ((quantity, divergence, apart), texts) in found.into_iter().zip(texts) {
+            let Divergence { exact_ns, notable_ns, largest } = *divergence;
             let name = |what: &str| format!("{own}, {}: {what}", quantity.name());
-            let apart = comparison.at(quantity, ctx.cursor_ns);
             ui.label(RichText::new(quantity.name()).color(theme.text)).on_hover_text(quantity.meaning());
             time_button(ui, ctx, exact_ns, &name("first bitwise difference"));
             let tolerance = format!("≥ {}", difference_text(quantity, quantity.notable()));
@@ -176,7 +176,8 @@ fn table_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, number: usize, own: &str, c
             let color = if is_notable { theme.warn } else { theme.text_strong };
             number_ui(ui, &texts[0], color).on_hover_text(divergence::AT_CURSOR.meaning);
             number_ui(ui, &texts[1], theme.text_strong).on_hover_text(divergence::MAXIMUM.meaning);
-            time_button(ui, ctx, (largest > 0.0).then_some(largest_ns), &name("maximum difference"));
+            let largest_ns = largest.filter(|(largest, _)| *largest > 0.0).map(|(_, stamp_ns)| stamp_ns);
+            time_button(ui, ctx, largest_ns, &name("maximum difference"));
             ui.end_row();
         }
     });

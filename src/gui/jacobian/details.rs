@@ -25,8 +25,8 @@ pub(super) fn headline(model: &JacobianModel, row: usize, column: usize) -> Stri
     format!("{name}: {} {} ({size})", significant(f64::from(norm)), unit_text(block, model.joint_count))
 }
 
-/// Draws the values of the selected row, column or block; without a row, in the window, the columns of all calibration
-/// parameters.
+/// Draws the values of the selected row, column or block. Without a row, the window lists the columns of all calibration
+/// parameters below each other.
 pub(super) fn ui(
     ui: &mut Ui,
     ctx: &PanelContext<'_>,

@@ -292,10 +292,16 @@ fn font_of(style: Style) -> FontId {
 
 /// Rows with the numbers of each column aligned.
 pub(crate) fn aligned_rows(mut rows: Vec<Vec<String>>) -> Vec<Vec<String>> {
-    for column in 0..rows.iter().map(Vec::len).max().unwrap_or(0) {
+    align_columns(rows.iter_mut());
+    rows
+}
+
+/// Aligns the numbers of each column of some rows.
+pub(crate) fn align_columns<'r>(rows: impl Iterator<Item = &'r mut Vec<String>>) {
+    let mut rows: Vec<_> = rows.collect();
+    for column in 0..rows.iter().map(|row| row.len()).max().unwrap_or(0) {
         align_numbers(rows.iter_mut().filter_map(|row| row.get_mut(column)));
     }
-    rows
 }
 
 /// A grid of texts under headings, with aligned numbers; hovering a cell explains its column.

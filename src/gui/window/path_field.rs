@@ -35,7 +35,10 @@ impl PathField {
 
     /// Draws the text field; returns the chosen path.
     pub(in crate::gui) fn ui(&mut self, ui: &mut Ui, theme: &Theme, focus: bool, height: f32) -> Option<PathBuf> {
-        if self.completed.as_ref().is_none_or(|(typed, _)| *typed != self.typed) {
+        let id = ui.unique_id().with("path");
+        let focused = ui.memory(|memory| memory.has_focus(id));
+        self.lists |= focused || focus || !self.typed.is_empty();
+        if self.lists && self.completed.as_ref().is_none_or(|(typed, _)| *typed != self.typed) {
             let mut entries = self.desktop.as_ref().map_or_else(Vec::new, |desktop| desktop.complete(&self.typed));
             // After a completed folder, its content is listed.
             for entry in entries.iter_mut().filter(|entry| entry.folder && !entry.path.ends_with('/')) {
@@ -46,8 +49,6 @@ impl PathField {
         }
         let entries = self.completed.as_ref().map_or(&[][..], |(_, entries)| entries);
         let shown = &entries[..entries.len().min(MAX_ENTRIES)];
-        let id = ui.unique_id().with("path");
-        let focused = ui.memory(|memory| memory.has_focus(id));
         let (up, down, tab, enter) = ui.input_mut(|input| {
             let mut key = |key| focused && input.consume_key(Modifiers::NONE, key);
             (key(Key::ArrowUp), key(Key::ArrowDown), key(Key::Tab), key(Key::Enter))
@@ -89,8 +90,6 @@ impl PathField {
                 opened = Some(self.typed.trim().to_owned());
             }
         });
-        self.lists |= focused || focus || !self.typed.is_empty();
-        let shown = if self.lists { shown } else { &[] };
         ScrollArea::vertical().max_height(height).auto_shrink([false, true]).show(ui, |ui| {
             for (number, entry) in shown.iter().enumerate() {
                 let text = if entry.folder { format!("📁 {}", entry.path) } else { entry.path.clone() };
@@ -104,7 +103,7 @@ impl PathField {
                     }
                 }
             }
-            if self.lists && entries.len() > shown.len() {
+            if entries.len() > shown.len() {
                 let text = format!("{} more", entries.len() - shown.len());
                 ui.label(RichText::new(text).small().color(theme.text_weak));
             }
