@@ -62,6 +62,14 @@ fn images() -> Source {
 /// Samples and poses of a flight over 25 s with accelerations of up to 2 m/s², whose driver changes samples by the time and the
 /// orientation `world_from_imu`.
 fn flight(change: impl Fn(f64, &UnitQuaternion<f64>, &mut ImuSample)) -> (ImuFacts, Vec<(i64, RigidTransform)>) {
+    flight_with(rate_at, change)
+}
+
+/// A flight with other angular rates.
+fn flight_with(
+    rate_at: impl Fn(f64) -> Vector3<f64>,
+    change: impl Fn(f64, &UnitQuaternion<f64>, &mut ImuSample),
+) -> (ImuFacts, Vec<(i64, RigidTransform)>) {
     let position = |t: f64| Vector3::new((2.0 * t).sin(), 0.5 * (1.6 * t).cos(), 0.3 * (2.4 * t).sin()) * 0.5;
     let mut world_from_imu = UnitQuaternion::identity();
     let (mut samples, mut poses) = (Vec::new(), Vec::new());
@@ -244,4 +252,15 @@ fn a_constant_bias_and_other_axes_of_a_ground_truth_are_sound_but_a_scale_is_not
     let change = pairs[0].fit.change.clone().unwrap();
     assert_eq!(change.parameter, Parameter::Scale);
     assert!((change.values[0] - 0.3).abs() < 0.01, "{change:?}");
+}
+
+#[test]
+fn scales_are_judged_on_axes_whose_forces_exceed_what_is_tolerated() {
+    let level = |axis: usize, factor: f64| {
+        let (imu_facts, poses) =
+            flight_with(|_| Vector3::zeros(), |_, _, sample| sample.specific_force_m_per_s2[axis] *= factor);
+        statements_of(&imu_facts, &poses).into_iter().map(|it| it.title).next()
+    };
+    assert_eq!(level(1, 1.12), None);
+    assert_eq!(level(0, 1.12).unwrap(), "the accelerometer or the motion of the ground truth is wrong: they disagree");
 }
