@@ -73,8 +73,9 @@ pub struct EstimatorOptions {
     pub keyframe_new_ratio: f64,
     /// Mean reprojection error above which a feature is rejected, in pixels.
     pub outlier_px: f64,
-    /// Distance in attitude and joint angles from the linearization point, in radians, within which Jacobians of states
-    /// in the prior are evaluated there; beyond it, or with 0, they are evaluated at the current estimate.
+    /// Rotation of the vehicle from the linearization point, in radians, within which Jacobians of states in the prior are
+    /// evaluated there; beyond it, or with 0, they are evaluated at the current estimate. Joint angles with encoder
+    /// readings stay at the linearization point, as the chain does; without readings the same limit applies to them.
     ///
     /// First-estimate Jacobians prevent spurious information along unobservable directions. With inaccurate first
     /// estimates, as after a start with a chain error of degrees, they bias the solution: an error of a hundredth of a

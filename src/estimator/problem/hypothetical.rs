@@ -15,7 +15,7 @@ use crate::estimator::state::camera_pose;
 use crate::estimator::state::camera_view::{Track, TrackObservation};
 use crate::estimator::state::columns::{ColumnBlock, ColumnGroup, FrameId};
 use crate::estimator::state::estimate::Estimate;
-use crate::estimator::state::frame::{Frame, layout};
+use crate::estimator::state::frame::{FirstEstimateReach, Frame, layout};
 use crate::estimator::state::frame_state::{FrameState, Rates};
 use crate::estimator::state::gimbal_imu_noise::GimbalImuNoise;
 use crate::estimator::state::given_chain::GivenSigmas;
@@ -136,7 +136,7 @@ impl HypotheticalWindow {
             frames: &frames,
             prior: None,
             start: None,
-            first_estimate_reach_rad: 0.0,
+            first_estimate_reach: FirstEstimateReach::NONE,
             calibration_first_estimates: false,
         };
         let numbers: Vec<FrameId> = (0..frames.len()).map(FrameId).collect();

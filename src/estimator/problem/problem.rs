@@ -17,7 +17,7 @@ use crate::estimator::factors::start_prior::StartPrior;
 use crate::estimator::state::camera_pose::CameraMaps;
 use crate::estimator::state::camera_view::{CameraView, Track};
 use crate::estimator::state::estimate::Estimate;
-use crate::estimator::state::frame::Frame;
+use crate::estimator::state::frame::{FirstEstimateReach, Frame};
 use crate::estimator::state::gimbal_imu_noise::GimbalImuNoise;
 use crate::estimator::state::layout::Layout;
 use crate::optimization::Landmark;
@@ -40,7 +40,7 @@ pub(crate) struct Problem<'a> {
     pub(crate) frames: &'a [Frame],
     pub(crate) prior: Option<&'a Prior>,
     pub(crate) start: Option<&'a StartPrior>,
-    pub(crate) first_estimate_reach_rad: f64,
+    pub(crate) first_estimate_reach: FirstEstimateReach,
     pub(crate) calibration_first_estimates: bool,
 }
 
@@ -65,10 +65,10 @@ impl Problem<'_> {
     /// it, and of the calibration if configured; otherwise the values of `estimate`.
     pub(crate) fn linearization_point(&self, estimate: &Estimate) -> Estimate {
         let frames = self.frames.iter().zip(&estimate.frames);
-        let reach_rad = self.first_estimate_reach_rad;
+        let reach = self.first_estimate_reach;
         let calibration = &estimate.calibration;
         Estimate {
-            frames: frames.map(|(frame, current)| frame.linearization_point(current, reach_rad).clone()).collect(),
+            frames: frames.map(|(frame, current)| frame.linearization_point(current, reach).into_owned()).collect(),
             calibration: if self.calibration_first_estimates {
                 calibration.at_first_estimate()
             } else {

@@ -1,5 +1,6 @@
 //! A frame of the window with its measurements.
 
+use std::borrow::Cow;
 use std::ops::Deref;
 
 use super::frame_state::FrameState;
@@ -106,11 +107,37 @@ impl Frame {
         Self { gimbal_motion: motion.map(InformedMotion::new), ..self }
     }
 
-    /// State at which derivatives are evaluated: the first estimate while `current` is within `reach_rad` of it in
-    /// attitude and joint angles, else `current`.
-    pub(crate) fn linearization_point<'a>(&'a self, current: &'a FrameState, reach_rad: f64) -> &'a FrameState {
-        self.first_estimate.as_ref().filter(|first| current.rotation_from_rad(first) <= reach_rad).unwrap_or(current)
+    /// State at which derivatives are evaluated: the first estimate as far as `reach` allows, else `current`.
+    pub(crate) fn linearization_point<'a>(
+        &'a self,
+        current: &'a FrameState,
+        reach: FirstEstimateReach,
+    ) -> Cow<'a, FrameState> {
+        let Some(first) = &self.first_estimate else { return Cow::Borrowed(current) };
+        let joints_rad = if reach.holds_joints { 0.0 } else { current.joints_from_rad(first) };
+        if joints_rad.max(current.attitude_from_rad(first)) <= reach.radius_rad {
+            Cow::Borrowed(first)
+        } else if reach.holds_joints {
+            Cow::Owned(current.with_joints_of(first))
+        } else {
+            Cow::Borrowed(current)
+        }
     }
+}
+
+/// Changes since the first estimate within which derivatives are evaluated there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct FirstEstimateReach {
+    /// Largest rotation of the vehicle, in radians, and of the joints unless they are held.
+    pub(crate) radius_rad: f64,
+    /// Derivatives with respect to joint angles are evaluated at first estimates whatever the change, as those with respect
+    /// to the chain are.
+    pub(crate) holds_joints: bool,
+}
+
+impl FirstEstimateReach {
+    /// All derivatives at the current estimate.
+    pub(crate) const NONE: Self = Self { radius_rad: 0.0, holds_joints: false };
 }
 
 /// Column layout of a window with these frames.

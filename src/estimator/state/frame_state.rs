@@ -223,11 +223,21 @@ impl FrameState {
         self.joints_rad.len() + self.joint_motion.len()
     }
 
-    /// Largest rotation of vehicle or joints from another state, in radians.
-    pub(crate) fn rotation_from_rad(&self, other: &Self) -> f64 {
-        let vehicle = self.navigation.world_from_imu.rotation.angle_to(&other.navigation.world_from_imu.rotation);
+    /// Rotation of the vehicle from another state, in radians.
+    pub(crate) fn attitude_from_rad(&self, other: &Self) -> f64 {
+        self.navigation.world_from_imu.rotation.angle_to(&other.navigation.world_from_imu.rotation)
+    }
+
+    /// Largest rotation of a joint from another state, in radians.
+    pub(crate) fn joints_from_rad(&self, other: &Self) -> f64 {
         let joints = self.joints_rad.iter().zip(&other.joints_rad);
-        joints.map(|(angle, start)| wrap_angle(angle - start).abs()).fold(vehicle, f64::max)
+        joints.map(|(angle, start)| wrap_angle(angle - start).abs()).fold(0.0, f64::max)
+    }
+
+    /// This state with joint angles, rates and accelerations of another one.
+    pub(crate) fn with_joints_of(&self, other: &Self) -> Self {
+        let (joints_rad, joint_motion) = (other.joints_rad.clone(), other.joint_motion.clone());
+        Self { joints_rad, joint_motion, ..self.clone() }
     }
 
     /// Applies a step of the solver. A frame in the prior adds the step in the tangent space of its linearization

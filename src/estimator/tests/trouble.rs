@@ -1,6 +1,6 @@
 //! Flights with faults: missing encoders and images, a saturated IMU.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::fixture::{self, TestWindow};
@@ -11,7 +11,8 @@ use crate::estimator::report::{EventKind, StepReport};
 use crate::estimator::state::calibrations::MAIN;
 use crate::estimator::{Estimator, Phase};
 use crate::frontend::FeatureId;
-use crate::gimbal::{Parameterization, transport_covariance};
+use crate::geometry::wrap_angle;
+use crate::gimbal::{Chain, Parameterization, transport_covariance};
 use crate::optimization::Cholesky;
 use crate::sensors::ImuSample;
 use crate::simulation::{
@@ -313,4 +314,23 @@ fn the_window_converges_from_poor_initial_values() {
     let product = |errors: &[f64]| errors.iter().product::<f64>();
     // The cube root of the product is the geometric mean of the three ratios.
     assert!((product(&ours) / product(&theirs)).cbrt() < 0.75, "{ours:?} against {theirs:?}");
+}
+
+/// Derivatives of some joint angles at first estimates and of others at current ones would together observe directions
+/// that no measurement observes.
+#[test]
+fn sigma_covers_the_errors_of_a_chain_that_was_far_off() {
+    let mean_square = |seed: u64| {
+        let flight = far_off(seed, 15.0);
+        let config = fixture::config(&flight.given_rig, Parameterization::Minimal, EstimatorOptions::default());
+        let (_, reports) = run_flight(&flight.frames, config);
+        let truth = flight.true_rig.chain_of_camera("cam0").unwrap();
+        let truth = Chain::from_classical(&truth, Parameterization::Minimal);
+        let found = &reports.last().unwrap().calibration;
+        let errors = (DVector::from_column_slice(&found.values) - truth.values()).map(wrap_angle);
+        errors.component_div(&DVector::from_column_slice(&found.sigmas)).norm_squared() / truth.dof() as f64
+    };
+    let mean_squares: Vec<f64> = (1_u64..=3).into_par_iter().map(mean_square).collect();
+    let rms = (mean_squares.iter().sum::<f64>() / mean_squares.len() as f64).sqrt();
+    assert!((0.6..1.3).contains(&rms), "{rms}: {mean_squares:?}");
 }

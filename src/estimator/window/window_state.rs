@@ -11,7 +11,7 @@ use crate::estimator::problem::problem::{CameraFactors, Problem};
 use crate::estimator::state::calibrations::{Calibrations, MAIN};
 use crate::estimator::state::camera_view::CameraView;
 use crate::estimator::state::estimate::Estimate;
-use crate::estimator::state::frame;
+use crate::estimator::state::frame::{self, FirstEstimateReach};
 use crate::estimator::state::gimbal_imu_noise::GimbalImuNoise;
 use crate::gimbal::Parameterization;
 use crate::optimization::Landmark;
@@ -66,6 +66,11 @@ impl WindowState {
         // parameterization has redundant directions, which need first estimates.
         let redundant = self.calibration.of(MAIN).chain().parameterization() == Parameterization::Classical;
         let first_estimates = setup.config.gimbal_imu.is_none() || redundant;
+        let reach = if first_estimates && options.first_estimate_reach_rad > 0.0 {
+            FirstEstimateReach { radius_rad: options.first_estimate_reach_rad, holds_joints: self.holds_joints(setup) }
+        } else {
+            FirstEstimateReach::NONE
+        };
         Problem {
             layout,
             cameras: (0..self.calibration.cameras()).map(factors).collect(),
@@ -74,9 +79,20 @@ impl WindowState {
             frames: &self.frames,
             prior: self.prior.as_ref(),
             start: self.start.as_ref(),
-            first_estimate_reach_rad: if first_estimates { options.first_estimate_reach_rad } else { 0.0 },
+            first_estimate_reach: reach,
             calibration_first_estimates: options.calibration_first_estimates && first_estimates,
         }
+    }
+
+    /// True if derivatives with respect to joint angles stay at first estimates, as those with respect to the chain do: an
+    /// offset of the chain and one of the joint angles compensate each other, and derivatives at two different angles would
+    /// observe them.
+    ///
+    /// Not where first estimates are in error by many degrees and would bias the poses: without encoder readings, and after
+    /// the start with a stereo pair, half a second after the first image.
+    fn holds_joints(&self, setup: &Setup) -> bool {
+        let starts_with_pair = self.calibration.of(self.calibration.leading()).partner().is_some();
+        setup.config.encoder_in_use().is_some() && !starts_with_pair
     }
 
     /// Camera model, pixel noise and current robust losses of a camera.
