@@ -68,7 +68,7 @@ impl Problem<'_> {
         let reach = self.first_estimate_reach;
         let calibration = &estimate.calibration;
         Estimate {
-            frames: frames.map(|(frame, current)| frame.linearization_point(current, reach).into_owned()).collect(),
+            frames: frames.map(|(frame, current)| frame.linearization_point(current, reach)).collect(),
             calibration: if self.calibration_first_estimates {
                 calibration.at_first_estimate()
             } else {

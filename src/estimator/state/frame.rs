@@ -1,6 +1,5 @@
 //! A frame of the window with its measurements.
 
-use std::borrow::Cow;
 use std::ops::Deref;
 
 use super::frame_state::FrameState;
@@ -108,19 +107,15 @@ impl Frame {
     }
 
     /// State at which derivatives are evaluated: the first estimate as far as `reach` allows, else `current`.
-    pub(crate) fn linearization_point<'a>(
-        &'a self,
-        current: &'a FrameState,
-        reach: FirstEstimateReach,
-    ) -> Cow<'a, FrameState> {
-        let Some(first) = &self.first_estimate else { return Cow::Borrowed(current) };
+    pub(crate) fn linearization_point(&self, current: &FrameState, reach: FirstEstimateReach) -> FrameState {
+        let Some(first) = &self.first_estimate else { return current.clone() };
         let joints_rad = if reach.holds_joints { 0.0 } else { current.joints_from_rad(first) };
         if joints_rad.max(current.attitude_from_rad(first)) <= reach.radius_rad {
-            Cow::Borrowed(first)
+            first.clone()
         } else if reach.holds_joints {
-            Cow::Owned(current.with_joints_of(first))
+            current.with_joints_of(first)
         } else {
-            Cow::Borrowed(current)
+            current.clone()
         }
     }
 }

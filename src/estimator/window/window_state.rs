@@ -86,7 +86,7 @@ impl WindowState {
 
     /// True if derivatives with respect to joint angles stay at first estimates, as those with respect to the chain do: an
     /// offset of the chain and one of the joint angles compensate each other, and derivatives at two different angles would
-    /// observe them.
+    /// observe both of them separately.
     ///
     /// Not where first estimates are in error by many degrees and would bias the poses: without encoder readings, and after
     /// the start with a stereo pair, half a second after the first image.

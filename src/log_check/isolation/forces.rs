@@ -214,7 +214,7 @@ impl Forces {
             Comparison { rows: &rows, parameters: &PARAMETERS, sound: SOUND, changing: &[Parameter::ForceBias] };
         let mut fit = comparison.fit()?;
         if fit.disagrees.is_none()
-            // Differences within the tolerated ones can be those of other causes, however well they fit a scale.
+            // Other causes can explain differences within the tolerated ones, however well a scale fits them.
             && let Some(scales) = comparison.further(Parameter::AxisScales, fit.misfit.max(1.0))
         {
             let is_wrong = |[value, sigma]: &[f64; 2]| value.abs() > WRONG_AXIS.max(SIGNIFICANT_SIGMAS * sigma);
