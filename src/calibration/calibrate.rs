@@ -122,6 +122,11 @@ pub fn calibrate_along(
     let columns = both.columns();
     let chain_sigmas = |place: usize| both.covariance[(Columns::CHAIN + place, Columns::CHAIN + place)].max(0.0).sqrt();
     let pixels = |result: &StageResult, camera: Camera| pixel_report(input, result, camera);
+    let imu = ImuBuffer::new(&input.static_camera.views);
+    let gravity = gravity_in_world(input.gravity_m_per_s2);
+    let poses = |StageResult { estimate, pose_covariances, .. }: &StageResult| {
+        batch_trajectory(&imu, input.imu_noise, &gravity, &frame_sets, &estimate.navigation, pose_covariances)
+    };
     Ok(CalibrationOutcome {
         stretch_ns,
         frame_sets: frame_sets.len(),
@@ -153,14 +158,8 @@ pub fn calibrate_along(
         iterations: [alone.iterations, both.iterations],
         imu: imu_residual_report(input, &frame_sets, &both.estimate).ok_or_else(|| singular(BOTH))?,
         rank: rank(&both, &visited_rad),
-        trajectory: batch_trajectory(
-            &ImuBuffer::new(&input.static_camera.views),
-            input.imu_noise,
-            &gravity_in_world(input.gravity_m_per_s2),
-            &frame_sets,
-            &both.estimate.navigation,
-            &both.pose_covariances,
-        ),
+        static_trajectory: poses(&alone),
+        trajectory: poses(&both),
         warnings: warnings(counts, &segments, &frame_sets),
         posterior: posterior(&both, &priors.border),
         visited_rad,

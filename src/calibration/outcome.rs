@@ -111,6 +111,9 @@ pub struct CalibrationOutcome {
     pub rank: Option<RankReport>,
     /// Estimated joint angles of all measurements, in radians.
     pub visited_rad: Vec<Vec<f64>>,
+    /// From static camera and IMU only, without covariances.
+    pub static_trajectory: Vec<BatchPose>,
+    /// From both cameras, with covariances if they were requested.
     pub trajectory: Vec<BatchPose>,
     /// Problems that did not stop the calibration.
     pub warnings: Vec<String>,

@@ -38,7 +38,7 @@ pub(crate) struct CalibrateArguments {
     #[arg(long, value_name = "SECONDS", value_parser = seconds, conflicts_with = "stills")]
     pub duration: Option<f64>,
     /// Also write the estimated trajectory with covariances: trajectory.tum, a reference for runs (--truth-trajectory),
-    /// and covariance.csv.
+    /// and covariance.csv; in a further file the trajectory from the static camera alone.
     #[arg(long, conflicts_with = "stills")]
     pub trajectory: bool,
     #[command(flatten)]

@@ -11,10 +11,14 @@ use super::trajectory::{covariance_of_calibration, tum_of_calibration};
 use crate::geometry::Dimension;
 use crate::session::CalibrationRun;
 
-pub(super) const TRAJECTORY_FILES: [&str; 2] = ["trajectory.tum", "covariance.csv"];
+pub(super) const TRAJECTORY_FILES: [&str; 3] = [TRAJECTORY, STATIC_TRAJECTORY, "covariance.csv"];
+/// Trajectory of the bundle adjustment of both cameras.
+pub(crate) const TRAJECTORY: &str = "trajectory.tum";
+/// Trajectory of the bundle adjustment of static camera and IMU.
+pub(crate) const STATIC_TRAJECTORY: &str = "static_trajectory.tum";
 
-/// Writes `rig.yaml`, `calibration.json`, `posterior.json` and `report.txt` into a folder, and on request the trajectory
-/// with its covariances.
+/// Writes `rig.yaml`, `calibration.json`, `posterior.json` and `report.txt` into a folder, and on request the
+/// trajectories of static camera and of both cameras, the latter with its covariances.
 ///
 /// # Errors
 /// If a file or the folder cannot be written.
@@ -35,7 +39,8 @@ pub fn write_calibration(
         (POSTERIOR, posterior_of_calibration(run)),
     ];
     if trajectory {
-        let texts = [tum_of_calibration(run), covariance_of_calibration(run)];
+        let tum = |poses| tum_of_calibration(poses, run.epoch_ns);
+        let texts = [tum(&run.outcome.trajectory), tum(&run.outcome.static_trajectory), covariance_of_calibration(run)];
         files.extend(TRAJECTORY_FILES.into_iter().zip(texts));
     }
     let texts = files.into_iter().map(|(name, text)| (name.to_owned(), text.into_bytes()));

@@ -34,8 +34,15 @@ pub(crate) const RUN_FILES: [&str; 11] = [
     "results.mcap",
 ];
 const REPORT_FILES: [&str; 2] = ["report.json", "report.html"];
-const CALIBRATION_FILES: [&str; 6] =
-    ["calibration.json", "rig.yaml", POSTERIOR, "report.txt", TRAJECTORY_FILES[0], TRAJECTORY_FILES[1]];
+const CALIBRATION_FILES: [&str; 7] = [
+    "calibration.json",
+    "rig.yaml",
+    POSTERIOR,
+    "report.txt",
+    TRAJECTORY_FILES[0],
+    TRAJECTORY_FILES[1],
+    TRAJECTORY_FILES[2],
+];
 /// Size limit of a file that is read for the name of its log.
 const LARGEST_INDEX_BYTES: u64 = 64 << 20;
 

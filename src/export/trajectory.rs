@@ -7,6 +7,7 @@ use std::path::Path;
 use nalgebra::{Matrix6, Vector4};
 
 use super::error::ExportError;
+use crate::calibration::BatchPose;
 use crate::flight_log::{BATCH_REFERENCE, LogError, RecordedPose, read_trajectory_file};
 use crate::geometry::{RigidTransform, seconds_from_ns};
 use crate::session::accuracy::StampedPose;
@@ -49,10 +50,10 @@ pub fn tum_of_run(run: &RunRecord, epoch_ns: i64) -> String {
     tum(newest.map(|newest| (newest.stamp_ns, newest.world_from_imu)), epoch_ns)
 }
 
-/// Trajectory of an offline calibration, marked by its first line as a reference.
-pub(super) fn tum_of_calibration(run: &CalibrationRun) -> String {
-    let poses = run.outcome.trajectory.iter().map(|pose| (pose.stamp_ns, pose.world_from_imu));
-    format!("{BATCH_REFERENCE} by dcvins calibrate: t x y z qx qy qz qw\n{}", tum(poses, run.epoch_ns))
+/// A trajectory of an offline calibration, marked by its first line as a reference.
+pub(super) fn tum_of_calibration(poses: &[BatchPose], epoch_ns: i64) -> String {
+    let poses = poses.iter().map(|pose| (pose.stamp_ns, pose.world_from_imu));
+    format!("{BATCH_REFERENCE} by dcvins calibrate: t x y z qx qy qz qw\n{}", tum(poses, epoch_ns))
 }
 
 fn tum(poses: impl Iterator<Item = (i64, RigidTransform)>, epoch_ns: i64) -> String {

@@ -7,7 +7,7 @@ use super::perturbation::RigPerturbation;
 use super::plan::{Exclusion, StudyPlan};
 
 /// Jobs of a plan in the order of its tables: logs as found, then flights; for each the disturbances, perturbations,
-/// seeds and specifications, and for a recorded log its trajectories.
+/// seeds, specifications and bundle adjustments, and for a recorded log its trajectories.
 ///
 /// Recorded logs are run without disturbances, their trajectories are evaluated once, and the plan's exclusions are
 /// omitted. If neither the log nor the perturbation is random, there is one job without a seed instead of one for each
@@ -22,7 +22,7 @@ pub fn expand(plan: &StudyPlan, logs: &[RecordedLog], program: &str) -> Vec<Keye
             let seeds: Vec<Option<u64>> =
                 if perturbation.is_random() { plan.seeds.iter().copied().map(Some).collect() } else { vec![None] };
             for seed in seeds {
-                add_specs(&mut jobs, plan, &log, undisturbed, perturbation, seed);
+                add_subjects(&mut jobs, plan, &log, undisturbed, perturbation, seed);
             }
         }
         if let JobLog::Recorded(recorded) = &log {
@@ -42,7 +42,7 @@ pub fn expand(plan: &StudyPlan, logs: &[RecordedLog], program: &str) -> Vec<Keye
                 for seed in &plan.seeds {
                     let (recipe, disturb) = (recipe.clone(), level.disturb.clone());
                     let flight = JobLog::Simulated(Box::new(SimulatedFlight { recipe, disturb, seed: *seed }));
-                    add_specs(&mut jobs, plan, &flight, &level.name, perturbation, Some(*seed));
+                    add_subjects(&mut jobs, plan, &flight, &level.name, perturbation, Some(*seed));
                 }
             }
         }
@@ -65,7 +65,7 @@ impl Exclusion {
     }
 }
 
-fn add_specs(
+fn add_subjects(
     jobs: &mut Vec<StudyJob>,
     plan: &StudyPlan,
     log: &JobLog,
@@ -73,13 +73,14 @@ fn add_specs(
     perturbation: &RigPerturbation,
     seed: Option<u64>,
 ) {
-    jobs.extend(plan.specs.iter().map(|spec| StudyJob {
+    let runs = plan.specs.iter().cloned().map(JobSubject::Run);
+    jobs.extend(runs.chain(plan.bundles.iter().copied().map(JobSubject::Bundle)).map(|subject| StudyJob {
         study: plan.name.clone(),
         log: log.clone(),
         disturbance: disturbance.to_owned(),
         perturbation: perturbation.clone(),
         seed,
-        subject: JobSubject::Run(spec.clone()),
+        subject,
     }));
 }
 

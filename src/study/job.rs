@@ -1,5 +1,5 @@
-//! A job of a study: one run of the estimator or one trajectory of another program, named by the hash of its
-//! inputs.
+//! A job of a study: one run of the estimator, one bundle adjustment or one trajectory of another program, named by the
+//! hash of its inputs.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -10,6 +10,7 @@ use sha2::{Digest as _, Sha256};
 use super::perturbation::RigPerturbation;
 use super::recipe::FlightRecipe;
 use crate::session::{RunSpec, TrajectorySpec};
+use crate::text::Named;
 
 /// Version of the rules by which keys are made; another version gives other keys.
 const KEY_RULES: u32 = 1;
@@ -95,12 +96,26 @@ impl JobLog {
     }
 }
 
+/// Cameras of a bundle adjustment over the whole log, the limit for runs with the tracks of the same cameras.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Bundle {
+    /// Static camera and gimbal camera.
+    Both,
+    Static,
+}
+
+impl Named for Bundle {
+    const NAMES: &'static [(Self, &'static str)] = &[(Self::Both, "bundle"), (Self::Static, "static-bundle")];
+}
+
 /// Subject that a job evaluates on its log.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum JobSubject {
     Run(#[serde(with = "as_text")] RunSpec),
     Trajectory(StudyTrajectory),
+    Bundle(Bundle),
 }
 
 impl JobSubject {
@@ -109,29 +124,36 @@ impl JobSubject {
         match self {
             Self::Run(spec) => &spec.label,
             Self::Trajectory(trajectory) => &trajectory.spec.label,
+            Self::Bundle(bundle) => bundle.name(),
         }
     }
 
-    /// The specification of the run, `None` for a trajectory.
+    /// False for a trajectory of another program, which is read in negligible time and memory.
+    pub fn computes(&self) -> bool {
+        !matches!(self, Self::Trajectory(_))
+    }
+
+    /// The specification of the run, `None` for others.
     pub fn run(&self) -> Option<&RunSpec> {
         match self {
             Self::Run(spec) => Some(spec),
-            Self::Trajectory(_) => None,
+            Self::Trajectory(_) | Self::Bundle(_) => None,
         }
     }
 }
 
-/// The normalized specification of a run, or `trajectory:LABEL`, which is never a run specification.
+/// The normalized specification of a run; `trajectory:LABEL` and `offline:LABEL` are never run specifications.
 impl fmt::Display for JobSubject {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Run(spec) => spec.fmt(formatter),
             Self::Trajectory(trajectory) => write!(formatter, "trajectory:{}", trajectory.spec.label),
+            Self::Bundle(bundle) => write!(formatter, "offline:{}", bundle.name()),
         }
     }
 }
 
-/// One run specification, or one trajectory of another program, on one log.
+/// One run specification, one bundle adjustment, or one trajectory of another program, on one log.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StudyJob {
     pub study: String,
@@ -204,7 +226,7 @@ impl StudyJob {
             seed: self.seed,
             spec: self.subject.to_string(),
             trajectory: match &self.subject {
-                JobSubject::Run(_) => None,
+                JobSubject::Run(_) | JobSubject::Bundle(_) => None,
                 JobSubject::Trajectory(StudyTrajectory { spec, sha256 }) if sha256.is_empty() => {
                     Some(spec.source.to_string())
                 }

@@ -32,7 +32,7 @@ pub use comparison::{
     ComparisonError, MetricComparison, PairedVerdict, SUCCESS, StudyComparison, WorstPair, baseline_table, compare,
 };
 pub use expansion::{expand, shard};
-pub use job::{JobLog, JobSubject, KeyedJob, RecordedLog, SimulatedFlight, StudyJob, StudyTrajectory, hex};
+pub use job::{Bundle, JobLog, JobSubject, KeyedJob, RecordedLog, SimulatedFlight, StudyJob, StudyTrajectory, hex};
 pub use perturbation::{
     Distribution, MagnitudeDimension, PerturbationError, PerturbationStart, RigChange, RigPerturbation, RigQuantity,
 };

@@ -9,7 +9,7 @@ use super::folder::StudyFolder;
 use super::inputs::rig_sha256;
 use crate::calibration::CalibrationOptions;
 use crate::export::ExportError;
-use crate::export::calibration_files::write_calibration;
+use crate::export::calibration_files::{STATIC_TRAJECTORY, TRAJECTORY, write_calibration};
 use crate::export::calibration_report::report_calibration;
 use crate::export::masks;
 use crate::export::run_files::{RunFileOptions, write_run};
@@ -17,13 +17,14 @@ use crate::files::output::OutputSet;
 use crate::flight_log::{FlightLog, LogError};
 use crate::sensors::Rig;
 use crate::session::{
-    self, CalibrationRequest, CalibrationRun, CalibrationRunError, Recording, SessionError, SessionPlan,
+    self, CalibrationRequest, CalibrationRun, CalibrationRunError, Recording, RunSpec, SessionError, SessionPlan,
     SessionRequest, Stopwatch, TrajectorySource, TrajectorySpec, summarize,
 };
 use crate::study::{
-    JobCosts, JobLog, JobResult, JobStatus, JobSubject, KeyedJob, PerturbationStart, RunResult, StudyJob, StudyOutput,
-    StudyTables,
+    Bundle, JobCosts, JobLog, JobResult, JobStatus, JobSubject, KeyedJob, PerturbationStart, RunResult, StudyJob,
+    StudyOutput, StudyTables,
 };
+use crate::text::Named as _;
 
 /// Number of frames between two samples of the consistency of poses: about the length of a window, so that samples have
 /// few common measurements.
@@ -75,6 +76,33 @@ struct JobFiles {
     truth: Option<PathBuf>,
 }
 
+/// A job while it is executed.
+struct Execution<'a> {
+    key: &'a str,
+    job: &'a StudyJob,
+    files: JobFiles,
+    log_sha256: String,
+    program: &'a str,
+    attempts: usize,
+    output: StudyOutput,
+    stopwatch: Stopwatch,
+}
+
+impl Execution<'_> {
+    /// Session on the log of the job, without runs and trajectories.
+    fn request(&self) -> SessionRequest {
+        let (start_s, duration_s) = span(self.job);
+        SessionRequest {
+            log_path: self.files.log.clone(),
+            rig_path: self.files.rig.clone(),
+            ground_truth_path: self.files.truth.clone(),
+            start_s,
+            duration_s,
+            ..SessionRequest::default()
+        }
+    }
+}
+
 impl StudyFolder {
     fn files_of(&self, job: &StudyJob) -> JobFiles {
         match &job.log {
@@ -96,57 +124,57 @@ impl StudyFolder {
     ) -> Result<JobStatus, JobError> {
         let stopwatch = Stopwatch::start();
         let job = self.read_job(key)?;
-        let spec = match &job.subject {
-            JobSubject::Run(spec) => spec.clone(),
-            JobSubject::Trajectory(trajectory) => {
-                return self.evaluate_trajectory(key, &job, &trajectory.spec, program, attempts, output);
-            }
-        };
         let mut files = self.files_of(&job);
         let log_sha256 = self.log_sha256(&job).ok_or_else(|| JobError::NoFlight(files.log.clone()))?;
         let offline = if job.perturbation.start == PerturbationStart::Calibrated {
-            Some(self.calibrate(key, &job, &mut files)?)
+            let run = self.calibrate(key, &job, &files, false)?;
+            files.rig = Some(self.job(key).join("rig.yaml"));
+            Some(run)
         } else {
             None
         };
         if !job.perturbation.is_none() {
             files.rig = Some(self.write_perturbed_rig(key, &job, &files)?);
         }
-        let (start_s, duration_s) = span(&job);
-        let mut plan = SessionPlan::open(&SessionRequest {
-            log_path: files.log.clone(),
-            rig_path: files.rig.clone(),
-            ground_truth_path: files.truth.clone(),
-            specs: vec![spec],
-            start_s,
-            duration_s,
-            ..SessionRequest::default()
-        })?;
+        let execution = &Execution { key, job: &job, files, log_sha256, program, attempts, output, stopwatch };
+        match &job.subject {
+            JobSubject::Run(spec) => self.run_estimator(execution, spec, offline.as_ref()),
+            JobSubject::Trajectory(trajectory) => self.evaluate_trajectory(execution, &trajectory.spec),
+            JobSubject::Bundle(bundle) => {
+                self.calibrate(key, &job, &execution.files, true)?;
+                let source = TrajectorySource::File(self.bundle_trajectory(key, *bundle));
+                self.evaluate_trajectory(execution, &TrajectorySpec { source, label: bundle.name().to_owned() })
+            }
+        }
+    }
+
+    fn run_estimator(
+        &self,
+        execution: &Execution<'_>,
+        spec: &RunSpec,
+        offline: Option<&CalibrationRun>,
+    ) -> Result<JobStatus, JobError> {
+        let mut plan = SessionPlan::open(&SessionRequest { specs: vec![spec.clone()], ..execution.request() })?;
         plan.keep_linearization_every = Some(CONSISTENCY_EVERY);
         plan.memory_budget_bytes = RECORD_BYTES;
         let recording = session::compute(&plan, &mut |_| ())?.into_recording();
         plan.log.require_unshortened()?;
+        let &Execution { key, job, ref files, output, .. } = execution;
         let run = recording.runs.first().ok_or_else(|| JobError::NoImage(files.log.clone()))?;
         if let Some(error) = &run.error {
             return Err(JobError::Estimator(error.clone()));
         }
         if run.steps.is_empty() {
-            return Err(JobError::NoImage(files.log));
+            return Err(JobError::NoImage(files.log.clone()));
         }
         let summary = summarize(&recording, run, true);
-        let costs = JobCosts {
-            log_sha256: Some(log_sha256),
-            rig_sha256: Some(rig_sha256(&plan.rig)),
-            wall_s: stopwatch.elapsed_ms() * 1e-3,
-            peak_memory_bytes: peak_memory_bytes(),
-            ..self.costs(&job, &files, program, attempts)
-        };
+        let costs = self.costs_of(execution, &plan);
         let consistency = run.pose_consistency();
         let initialized = summary.frames.initialized_at_s.is_some();
         let status = if initialized { JobStatus::Ok } else { JobStatus::NotInitialized };
         let result = JobResult {
             key,
-            job: &job,
+            job,
             status,
             message: summary.accuracy_missing.as_deref().filter(|_| !initialized).unwrap_or_default(),
             costs: &costs,
@@ -155,7 +183,7 @@ impl StudyFolder {
                 record: run,
                 summary: &summary,
                 consistency: &consistency,
-                offline: offline.as_ref(),
+                offline,
             }),
             trajectory: None,
         };
@@ -167,38 +195,15 @@ impl StudyFolder {
         Ok(status)
     }
 
-    /// Evaluates a trajectory of another program against the ground truth of its log and writes its row.
-    fn evaluate_trajectory(
-        &self,
-        key: &str,
-        job: &StudyJob,
-        spec: &TrajectorySpec,
-        program: &str,
-        attempts: usize,
-        output: StudyOutput,
-    ) -> Result<JobStatus, JobError> {
-        let stopwatch = Stopwatch::start();
-        let files = self.files_of(job);
-        let (start_s, duration_s) = span(job);
-        let plan = SessionPlan::open(&SessionRequest {
-            log_path: files.log.clone(),
-            rig_path: files.rig.clone(),
-            ground_truth_path: files.truth.clone(),
-            trajectories: vec![spec.clone()],
-            start_s,
-            duration_s,
-            ..SessionRequest::default()
-        })?;
+    /// Evaluates a trajectory against the ground truth of its log and writes its row.
+    fn evaluate_trajectory(&self, execution: &Execution<'_>, spec: &TrajectorySpec) -> Result<JobStatus, JobError> {
+        let request = SessionRequest { trajectories: vec![spec.clone()], ..execution.request() };
+        let plan = SessionPlan::open(&request)?;
         let recording = Recording::new(&plan);
         plan.log.require_unshortened()?;
-        let costs = JobCosts {
-            rig_sha256: Some(rig_sha256(&plan.rig)),
-            log_sha256: self.log_sha256(job),
-            wall_s: stopwatch.elapsed_ms() * 1e-3,
-            peak_memory_bytes: peak_memory_bytes(),
-            ..self.costs(job, &files, program, attempts)
-        };
+        let costs = self.costs_of(execution, &plan);
         let lane = &recording.trajectories[0];
+        let &Execution { key, job, output, .. } = execution;
         let result = JobResult {
             key,
             job,
@@ -212,6 +217,26 @@ impl StudyFolder {
         Ok(JobStatus::Ok)
     }
 
+    /// Costs of a job that has a result so far.
+    fn costs_of(&self, execution: &Execution<'_>, plan: &SessionPlan) -> JobCosts {
+        let Execution { key, job, files, program, attempts, .. } = execution;
+        JobCosts {
+            log_sha256: Some(execution.log_sha256.clone()),
+            rig_sha256: Some(rig_sha256(&plan.rig)),
+            wall_s: execution.stopwatch.elapsed_ms() * 1e-3,
+            peak_memory_bytes: peak_memory_bytes(),
+            ..self.costs(key, job, files, program, *attempts)
+        }
+    }
+
+    /// Path of the trajectory of a bundle adjustment.
+    fn bundle_trajectory(&self, key: &str, bundle: Bundle) -> PathBuf {
+        self.job(key).join(match bundle {
+            Bundle::Both => TRAJECTORY,
+            Bundle::Static => STATIC_TRAJECTORY,
+        })
+    }
+
     /// SHA-256 of the log of a job, `None` for a flight that is not rendered.
     fn log_sha256(&self, job: &StudyJob) -> Option<String> {
         match &job.log {
@@ -220,10 +245,12 @@ impl StudyFolder {
         }
     }
 
-    fn costs(&self, job: &StudyJob, files: &JobFiles, program: &str, attempts: usize) -> JobCosts {
+    /// Costs of a job by its inputs.
+    fn costs(&self, key: &str, job: &StudyJob, files: &JobFiles, program: &str, attempts: usize) -> JobCosts {
         let relative = |path: &Option<PathBuf>| path.as_ref().map(|path| self.relative(path));
         let trajectory_path = match &job.subject {
             JobSubject::Run(_) => None,
+            JobSubject::Bundle(bundle) => Some(self.relative(&self.bundle_trajectory(key, *bundle))),
             JobSubject::Trajectory(trajectory) => Some(match &trajectory.spec.source {
                 TrajectorySource::File(path) => self.relative(path),
                 topic @ TrajectorySource::Topic(_) => topic.to_string(),
@@ -255,15 +282,20 @@ impl StudyFolder {
         let costs = JobCosts {
             log_sha256: self.log_sha256(job),
             wall_s: costs.wall_s,
-            ..self.costs(job, &self.files_of(job), &costs.program, costs.attempts)
+            ..self.costs(key, job, &self.files_of(job), &costs.program, costs.attempts)
         };
         let result = JobResult { key, job, status, message, costs: &costs, run: None, trajectory: None };
         Ok(self.write_rows(key, &StudyTables::of(&result, output.frames), output)?)
     }
 
-    /// Calibrates offline from the log of a job, writes the files of `dcvins calibrate` into its folder, and makes the
-    /// result its rig.
-    fn calibrate(&self, key: &str, job: &StudyJob, files: &mut JobFiles) -> Result<CalibrationRun, JobError> {
+    /// Calibrates offline from the log of a job and writes the files of `dcvins calibrate` into its folder.
+    fn calibrate(
+        &self,
+        key: &str,
+        job: &StudyJob,
+        files: &JobFiles,
+        trajectory: bool,
+    ) -> Result<CalibrationRun, JobError> {
         let (start_s, duration_s) = span(job);
         let request = CalibrationRequest {
             log_path: files.log.clone(),
@@ -273,10 +305,9 @@ impl StudyFolder {
             duration_s,
             ..CalibrationRequest::default()
         };
-        let run = session::calibrate(&request, &CalibrationOptions::default(), &mut |_| ControlFlow::Continue(()))?;
-        let (report, folder) = (report_calibration(&run), self.job(key));
-        write_calibration(&run, &report, &folder, false)?;
-        files.rig = Some(folder.join("rig.yaml"));
+        let options = CalibrationOptions { pose_covariances: trajectory, ..CalibrationOptions::default() };
+        let run = session::calibrate(&request, &options, &mut |_| ControlFlow::Continue(()))?;
+        write_calibration(&run, &report_calibration(&run), &self.job(key), trajectory)?;
         Ok(run)
     }
 

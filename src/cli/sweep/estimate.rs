@@ -114,8 +114,7 @@ fn measure(sweep: &Sweep) -> Result<Measured> {
         if let JobLog::Simulated(flight) = &job.job.log {
             flights.insert(flight.id(), flight);
         }
-        // Reading trajectories of other programs takes negligible time.
-        if job.job.subject.run().is_none() {
+        if !job.job.subject.computes() {
             continue;
         }
         let Some(row) = sweep.folder.run_of(&job.key)? else { continue };
@@ -159,7 +158,7 @@ fn estimate(sweep: &Sweep, limits: &PoolLimits, measured: &Measured) -> SweepEst
     let mean_s = per(measured.wall_s, measured.jobs as f64);
     let per_log_s = per(measured.wall_s, measured.log_s);
     let job_s = |job: &&KeyedJob| match log_s(sweep, job) {
-        _ if job.job.subject.run().is_none() => 0.0,
+        _ if !job.job.subject.computes() => 0.0,
         known_s if known_s > 0.0 && per_log_s > 0.0 => known_s * per_log_s,
         _ => mean_s,
     };

@@ -337,7 +337,7 @@ impl<'a> Pool<'a> {
     /// Updates the peak memory of a log from the row of a run; a trajectory of another program is no measure for runs.
     fn measure(&mut self, job: usize) -> Result<()> {
         let keyed = &self.jobs[job];
-        if keyed.job.subject.run().is_none() {
+        if !keyed.job.subject.computes() {
             return Ok(());
         }
         let row = self.folder.run_of(&keyed.key)?;

@@ -7,14 +7,16 @@ use super::study_plan::{DisturbanceSet, JobLimits, LOG_PLACE, LogSource, SlurmOp
 use super::tables;
 use crate::session::{RunSpec, TrajectorySpec, TrajectorySpecError};
 use crate::simulation::Disturbances;
+use crate::study::job::Bundle;
 use crate::study::perturbation::{Distribution, MagnitudeError, RigChange, RigPerturbation, RigQuantity};
 use crate::study::recipe::{EncoderNoise, FlightRecipe};
 use crate::text::Named as _;
 
-const PLAN_KEYS: [&str; 13] = [
+const PLAN_KEYS: [&str; 14] = [
     "name",
     "seeds",
     "specs",
+    "bundles",
     "logs",
     "flights",
     "disturbances",
@@ -44,6 +46,7 @@ impl StudyPlan {
             logs: root.sections("logs")?.iter().map(log).collect::<Result<_, _>>()?,
             flights: root.sections("flights")?.iter().map(flight).collect::<Result<_, _>>()?,
             specs: specs(&root)?,
+            bundles: root.texts("bundles", bundle)?,
             perturbations: perturbations(&root)?,
             disturbances: disturbances(&root)?,
             seeds: seeds(&root)?,
@@ -65,9 +68,9 @@ impl StudyPlan {
         distinct(&root, "flights", plan.flights.iter().map(|flight| flight.name.as_str()))?;
         distinct(&root, "perturbations", plan.perturbations.iter().map(|level| level.name.as_str()))?;
         distinct(&root, "disturbances", plan.disturbances.iter().map(|level| level.name.as_str()))?;
-        distinct(&root, "specs", plan.specs.iter().map(|spec| spec.label.as_str()))?;
+        distinct(&root, "specs", plan.labels())?;
         for trajectory in plan.logs.iter().flat_map(|log| &log.trajectories) {
-            if plan.specs.iter().any(|spec| spec.label == trajectory.label) {
+            if plan.labels().any(|label| label == trajectory.label) {
                 let problem =
                     format!("a trajectory and a run are named '{}', expected different names", trajectory.label);
                 return Err(root.error_at("specs", &problem));
@@ -107,6 +110,10 @@ fn specs(root: &Section<'_>) -> Result<Vec<RunSpec>, PlanError> {
         return Err(root.error_at("specs", "is empty, expected at least one run, as in [\"auto\"]"));
     }
     Ok(if specs.is_empty() { vec![RunSpec::default()] } else { specs })
+}
+
+fn bundle(name: &str) -> Result<Bundle, String> {
+    Bundle::from_name(name).ok_or_else(|| format!("expected {}", Bundle::alternatives()))
 }
 
 /// The name of a level: short, and without line breaks.

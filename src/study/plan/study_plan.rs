@@ -6,9 +6,11 @@ use serde::{Deserialize, Serialize};
 
 use super::summary_table::SummaryTable;
 use crate::session::{RunSpec, TrajectorySpec};
+use crate::study::job::Bundle;
 use crate::study::perturbation::RigPerturbation;
 use crate::study::recipe::FlightRecipe;
 use crate::study::table::StudyTable;
+use crate::text::Named as _;
 
 /// Recorded logs of a plan: every file that a pattern matches.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,7 +52,7 @@ pub struct Exclusion {
     pub disturbances: Vec<String>,
     /// Names of rig errors.
     pub perturbations: Vec<String>,
-    /// Names of the runs in `[[runs]]`.
+    /// Names of runs and bundle adjustments.
     pub specs: Vec<String>,
     pub seeds: Vec<u64>,
 }
@@ -109,6 +111,8 @@ pub struct StudyPlan {
     pub flights: Vec<FlightRecipe>,
     /// Runs on each log.
     pub specs: Vec<RunSpec>,
+    /// Bundle adjustments over each log.
+    pub bundles: Vec<Bundle>,
     /// Levels of the rig's errors.
     pub perturbations: Vec<RigPerturbation>,
     pub disturbances: Vec<DisturbanceSet>,
@@ -129,5 +133,11 @@ impl StudyPlan {
     /// The plan's tables of a table of runs, as Markdown.
     pub fn tables_text(&self, runs: &StudyTable) -> String {
         self.tables.iter().map(|table| table.markdown(runs)).collect::<Vec<_>>().join("\n")
+    }
+
+    /// Names of runs and bundle adjustments in the tables.
+    pub(super) fn labels(&self) -> impl Iterator<Item = &str> {
+        let bundles = self.bundles.iter().map(|bundle| bundle.name());
+        self.specs.iter().map(|spec| spec.label.as_str()).chain(bundles)
     }
 }

@@ -42,7 +42,7 @@ pub(super) fn check_exclusions(root: &Section<'_>, plan: &StudyPlan) -> Result<(
         let flights = plan.flights.iter().map(|flight| flight.name.as_str()).collect::<Vec<_>>();
         let disturbances = plan.disturbances.iter().map(|level| level.name.as_str()).collect::<Vec<_>>();
         let perturbations = plan.perturbations.iter().map(|level| level.name.as_str()).collect::<Vec<_>>();
-        let specs = plan.specs.iter().map(|spec| spec.label.as_str()).collect::<Vec<_>>();
+        let specs = plan.labels().collect::<Vec<_>>();
         let mut named = vec![
             ("disturbances", &exclusion.disturbances, disturbances),
             ("perturbations", &exclusion.perturbations, perturbations),

@@ -117,8 +117,27 @@ fn trajectories_are_evaluated_once_for_each_log() {
 }
 
 #[test]
+fn bundles_are_jobs_beside_the_runs() {
+    let plan = |bundles: &str| StudyPlan::from_toml(&format!("bundles = [{bundles}]\n{WHOLE}"));
+    let [runs, all] = ["", "\"bundle\", \"static-bundle\""].map(|bundles| {
+        let jobs = expand(&plan(bundles).unwrap(), &[log("a")], "0.2.0");
+        jobs.into_iter().map(|job| (job.key, job.job.subject.label().to_owned())).collect::<Vec<_>>()
+    });
+    let same: Vec<_> = all.iter().filter(|(_, label)| !label.ends_with("bundle")).collect();
+    assert_eq!(same, runs.iter().collect::<Vec<_>>());
+    let of = |name: &str| all.iter().filter(|(_, label)| label == name).count();
+    assert_eq!([of("bundle"), of("static-bundle")], [of("auto"); 2]);
+    assert_eq!(all.iter().map(|(key, _)| key).collect::<BTreeSet<_>>().len(), all.len());
+    let error = plan("\"gimbal\"").unwrap_err().to_string();
+    assert!(error.contains("'gimbal': expected bundle or static-bundle"), "{error}");
+    let twice = WHOLE.replace("name=no-encoder", "name=bundle").replace("\"no-encoder\"", "\"bundle\"");
+    let error = StudyPlan::from_toml(&format!("bundles = [\"bundle\"]\n{twice}")).unwrap_err().to_string();
+    assert!(error.contains("two entries named 'bundle'"), "{error}");
+}
+
+#[test]
 fn a_job_comes_back_from_its_text() {
-    let plan = StudyPlan::from_toml(WHOLE).unwrap();
+    let plan = StudyPlan::from_toml(&format!("bundles = [\"bundle\"]\n{WHOLE}")).unwrap();
     for job in expand(&plan, &[log("a"), log_with_trajectories("b")], "0.2.0") {
         let text = serde_json::to_string(&job.job).unwrap();
         let read: StudyJob = serde_json::from_str(&text).unwrap();

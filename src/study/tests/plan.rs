@@ -250,6 +250,7 @@ fn plans_of_the_documents_and_benches_are_read() {
     check("uneven_short", include_str!("../../../benches/paper_tables/uneven_short.toml"));
     check("losing_sight", include_str!("../../../benches/paper_tables/losing_sight.toml"));
     check("cameras", include_str!("../../../benches/paper_tables/cameras.toml"));
+    check("bundle", include_str!("../../../benches/paper_tables/bundle.toml"));
     check("gimbal_imu", include_str!("../../../benches/paper_tables/gimbal_imu.toml"));
     check("gimbal_imu_whole", include_str!("../../../benches/paper_tables/gimbal_imu_whole.toml"));
     check("regression", include_str!("../../../benches/regression/plan.toml"));
