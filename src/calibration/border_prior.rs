@@ -75,6 +75,11 @@ impl BorderTerm {
             square_root_information: prior_square_root_information(covariance),
         }
     }
+
+    /// Covariance of the prior (borders × borders), `None` if its information is not positive definite.
+    pub(super) fn covariance(&self) -> Option<DMatrix<f64>> {
+        Some(self.square_root_information.tr_mul(&self.square_root_information).cholesky()?.inverse())
+    }
 }
 
 /// Covariance of the border under the rig's prior (borders × borders).

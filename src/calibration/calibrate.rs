@@ -19,8 +19,8 @@ use super::trajectory::{InitialTrajectory, batch_trajectory};
 use super::{CalibrationError, CalibrationInput, CalibrationOptions, observations, trajectory};
 use crate::estimator::factors::start_prior::StartPrior;
 use crate::estimator::{
-    CalibrationPosterior, CameraPosterior, ColumnBlock, ColumnId, ImuBias, Linearization, NavigationState,
-    gravity_in_world, imu_factor,
+    CalibrationPosterior, CameraPosterior, ColumnBelief, ColumnBlock, ColumnId, ImuBias, Linearization,
+    NavigationState, gravity_in_world, imu_factor,
 };
 use crate::geometry::{RigidTransform, seconds_from_ns};
 use crate::gimbal::{Chain, ClassicalChain, ParameterId, Parameterization};
@@ -310,22 +310,31 @@ fn posterior(result: &StageResult, prior: &BorderTerm) -> CalibrationPosterior {
     let (columns, estimate) = (result.columns(), &result.estimate);
     let chain: Vec<usize> = (Columns::CHAIN..=columns.gimbal_shift()).collect();
     let order: Vec<usize> = chain.iter().copied().chain(0..=Columns::STATIC_SHIFT).collect();
+    let ordered = |covariance: &DMatrix<f64>| covariance.select_rows(&order).select_columns(&order);
+    let mount = |imu_from_camera: RigidTransform| {
+        let mount = ClassicalChain { imu_from_base: imu_from_camera, ..ClassicalChain::default() };
+        Chain::from_classical(&mount, Parameterization::Minimal)
+    };
+    let values = |chain: &Chain, shift_s: f64| chain.values().iter().copied().chain([shift_s]).collect::<Vec<f64>>();
     let camera = |chain: &Chain, shift_s: f64, columns: &[usize]| CameraPosterior {
         chain: chain.to_classical(),
         parameterization: chain.parameterization(),
         parameters: chain.parameters().into_iter().chain([ParameterId::timeshift(0)]).collect(),
-        values: chain.values().iter().copied().chain([shift_s]).collect(),
+        values: values(chain, shift_s),
         rig_sigmas: columns.iter().map(|column| prior.rig_sigmas[*column]).collect(),
     };
-    let mount = ClassicalChain { imu_from_base: estimate.extrinsics, ..ClassicalChain::default() };
-    let mount = Chain::from_classical(&mount, Parameterization::Minimal);
-    let cameras = [
-        (&estimate.chain, estimate.shifts_s[1], &order[..chain.len()]),
-        (&mount, estimate.shifts_s[0], &order[chain.len()..]),
-    ];
+    let (of_gimbal, of_static) = order.split_at(chain.len());
+    let before = [(&prior.chain.given, prior.shifts_s[1]), (&mount(prior.extrinsics), prior.shifts_s[0])];
     CalibrationPosterior {
-        cameras: cameras.into_iter().map(|(chain, shift_s, columns)| camera(chain, shift_s, columns)).collect(),
-        covariance: result.covariance.select_rows(&order).select_columns(&order),
+        cameras: vec![
+            camera(&estimate.chain, estimate.shifts_s[1], of_gimbal),
+            camera(&mount(estimate.extrinsics), estimate.shifts_s[0], of_static),
+        ],
+        covariance: ordered(&result.covariance),
+        before: prior.covariance().map(|covariance| ColumnBelief {
+            values: before.into_iter().flat_map(|(chain, shift_s)| values(chain, shift_s)).collect(),
+            covariance: ordered(&covariance),
+        }),
     }
 }
 

@@ -10,7 +10,7 @@
 //! 3. *Pixels.* One bundle adjustment of both cameras: all observations, IMU samples, encoder readings and
 //!    priors, all unknowns jointly.
 //!
-//! From still images of known points, without IMU: [`stills`].
+//! From still images of known points, without IMU: [`stills`]. Over many flights: [`history`].
 //!
 //! The chain uses its best minimal parameterization, in which every column is observable under sufficient excitation.
 
@@ -20,6 +20,7 @@ mod bundle;
 mod calibrate;
 mod error;
 mod frame_sets;
+pub mod history;
 mod imu_noise;
 mod input;
 mod observations;

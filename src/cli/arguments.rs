@@ -14,6 +14,7 @@ use crate::cli::excerpt::ExcerptArguments;
 use crate::cli::exit;
 use crate::cli::export::ExportArguments;
 use crate::cli::generate::GenerateArguments;
+use crate::cli::history::HistoryArguments;
 use crate::cli::noise::NoiseArguments;
 use crate::cli::plan::PlanArguments;
 use crate::cli::report::ReportArguments;
@@ -52,6 +53,9 @@ pub(crate) enum Command {
     /// Calibrate static camera and gimbal offline from a flight with both, as the paper's baseline does.
     #[command(after_help = exit::INTERRUPTIBLE)]
     Calibrate(CalibrateArguments),
+    /// Compare the calibrations of one vehicle over its flights: which agree, what changed and when, what they know together.
+    #[command(after_help = exit::HISTORY)]
+    History(HistoryArguments),
     /// Check a log and its rig: content, timing, calibration, noise; each finding with evidence and remedy.
     #[command(after_help = exit::CHECK)]
     Check(CheckArguments),

@@ -8,7 +8,7 @@ pub(crate) enum ExitOutcome {
     Success,
     /// A run never initialized.
     NeverInitialized,
-    /// `check` has found errors.
+    /// `check` has found errors, or `history` a flight that does not agree with those before it.
     ErrorsFound,
     /// The condition of `--break` became true.
     BreakHit,
@@ -57,5 +57,7 @@ pub(crate) const SWEEP: &str = "Exit codes: 0 success, 1 failure, worse than the
 pub(crate) const DIAGNOSE: &str = "Exit codes: 0 a cause, several or none, 1 failure, 2 wrong use, 130 interrupted (Ctrl+C; what \
     is known so far is printed; a second Ctrl+C ends at once).";
 /// Exit codes of `check`.
+pub(crate) const HISTORY: &str =
+    "Exit codes: 0 all flights agree, 1 failure, 2 wrong use, 4 a flight does not agree with those before it.";
 pub(crate) const CHECK: &str =
     "Exit codes: 0 no errors found (possibly warnings and notes), 1 failure, 2 wrong use, 4 errors found.";

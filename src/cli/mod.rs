@@ -15,6 +15,7 @@ mod export;
 #[cfg(feature = "gui")]
 mod figure_arguments;
 mod generate;
+mod history;
 mod interrupt;
 mod log_checking;
 mod noise;
@@ -67,6 +68,7 @@ pub(crate) fn run() -> anyhow::Result<ExitOutcome> {
         Command::Screenshot(arguments) => screenshot::screenshot(&arguments),
         Command::Report(arguments) => report::report(&arguments),
         Command::Calibrate(arguments) => calibrate::calibrate(&arguments),
+        Command::History(arguments) => history::history(&arguments),
         Command::Check(arguments) => check::check(&arguments),
         Command::Diagnose(arguments) => diagnose::diagnose(&arguments),
         Command::Noise(arguments) => noise::noise(&arguments),

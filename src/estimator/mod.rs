@@ -43,7 +43,7 @@ pub use report::{
 };
 pub use state::allocation::allocated_bytes;
 pub use state::calibration::INACCURATE_ROTATION_RAD;
-pub use state::calibration_posterior::{CalibrationPosterior, CalibrationPrior, CameraPosterior};
+pub use state::calibration_posterior::{CalibrationPosterior, CalibrationPrior, CameraPosterior, ColumnBelief};
 pub use state::columns::{ColumnBlock, ColumnGroup, ColumnId, FrameId};
 pub use state::earlier_pass::{BiasPrior, EarlierPass};
 pub use state::navigation::GimbalImuState;

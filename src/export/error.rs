@@ -26,6 +26,9 @@ pub enum ExportError {
     /// A file is not the posterior of a calibration.
     #[error("cannot start from this calibration: {problem}: {path}")]
     Posterior { problem: String, path: PathBuf },
+    /// Folders have no calibrations that can be compared.
+    #[error("no calibration to compare: {problem}: {path}")]
+    History { problem: String, path: PathBuf },
     #[error(transparent)]
     Log(#[from] LogError),
     #[error(transparent)]

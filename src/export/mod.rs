@@ -11,6 +11,8 @@ pub(crate) mod existing;
 pub(crate) mod file_hash;
 mod flight_noise;
 pub(crate) mod folder_files;
+mod history_folders;
+mod history_report;
 pub(crate) mod masks;
 mod motion_csv;
 mod noise_files;
@@ -48,6 +50,10 @@ pub use existing::{
     check_simulated_log, check_stills_folder, other_runs, write_new_rig,
 };
 pub use flight_noise::{DensityReport, FlightNoiseReport};
+pub use history_folders::LeftOut;
+pub use history_report::{
+    HistoryChange, HistoryFlight, HistoryInterval, HistoryParameter, HistoryReport, calibration_history, write_history,
+};
 pub use masks::write_masks;
 pub use motion_csv::{read_motion, write_motion};
 pub use noise_files::{write_allan, write_flight_noise};

@@ -8,7 +8,7 @@ use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 use super::error::ExportError;
-use crate::estimator::{CalibrationPosterior, CameraPosterior};
+use crate::estimator::{CalibrationPosterior, CameraPosterior, ColumnBelief};
 use crate::geometry::Dimension;
 use crate::gimbal::{Chain, ParameterGroup, ParameterId, Parameterization, UnknownParameterization};
 use crate::sensors::Rig;
@@ -29,11 +29,17 @@ const MAX_ROUNDING: f64 = 1e-6;
 #[derive(Serialize, Deserialize)]
 struct PosteriorFile {
     posterior_version: u32,
+    /// Time of the first message of the log, in nanoseconds since 1970 by its clock; `None` in older files.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    start_ns: Option<i64>,
     joints: Vec<String>,
     /// The main camera first.
     cameras: Vec<CameraEntry>,
     /// By rows, over the columns of all cameras.
     covariance: Vec<Vec<f64>>,
+    /// The same before any measurement of the flight; `None` in older files.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    covariance_before: Option<Vec<Vec<f64>>>,
     /// Standard deviations under the rig's prior, then after each flight.
     flights: Vec<FlightSigmas>,
 }
@@ -51,6 +57,9 @@ struct ColumnEntry {
     #[serde(default)]
     unit: String,
     value: f64,
+    /// Before any measurement of the flight; `None` in older files.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    before: Option<f64>,
     /// Under the prior of the rig.
     rig_sigma: f64,
 }
@@ -61,6 +70,7 @@ struct NamedPosterior<'a> {
     cameras: Vec<String>,
     rig: &'a Rig,
     prior: Option<&'a FlightPrior>,
+    start_ns: i64,
     /// Name of the log and of the run.
     source: String,
 }
@@ -74,6 +84,7 @@ impl<'a> NamedPosterior<'a> {
             cameras: run.camera_keys(estimate).into_iter().map(str::to_owned).collect(),
             rig: &recording.rig,
             prior: recording.prior.as_deref(),
+            start_ns: recording.epoch_ns,
             source: format!("{} ({})", log_name(&recording.log_path), run.spec.label),
         })
     }
@@ -84,6 +95,7 @@ impl<'a> NamedPosterior<'a> {
             cameras: vec![run.gimbal_camera.clone(), run.static_camera.clone()],
             rig: &run.given_rig,
             prior: run.prior.as_deref(),
+            start_ns: run.epoch_ns,
             source: format!("{} (calibrate)", log_name(&run.log_path)),
         }
     }
@@ -122,6 +134,9 @@ impl<'a> NamedPosterior<'a> {
 
     fn json(&self) -> String {
         let mut names = self.names().into_iter();
+        let before = self.posterior.before.as_ref();
+        let mut values_before = before.into_iter().flat_map(|before| before.values.iter().copied());
+        let by_rows = |matrix: &DMatrix<f64>| matrix.row_iter().map(|row| row.iter().copied().collect()).collect();
         let cameras = self.posterior.cameras.iter().zip(&self.cameras).map(|(camera, key)| CameraEntry {
             key: key.clone(),
             parameterization: camera.parameterization.to_string(),
@@ -135,15 +150,18 @@ impl<'a> NamedPosterior<'a> {
                     name,
                     unit: parameter.dimension().unit().to_owned(),
                     value: *value,
+                    before: values_before.next(),
                     rig_sigma: *rig_sigma,
                 })
                 .collect(),
         });
         let file = PosteriorFile {
             posterior_version: VERSION,
+            start_ns: Some(self.start_ns),
             joints: self.rig.joint_names(),
             cameras: cameras.collect(),
-            covariance: self.posterior.covariance.row_iter().map(|row| row.iter().copied().collect()).collect(),
+            covariance: by_rows(&self.posterior.covariance),
+            covariance_before: before.map(|before| by_rows(&before.covariance)),
             flights: self.flights(),
         };
         format!("{}\n", serde_json::to_string(&file).unwrap_or_default())
@@ -153,6 +171,13 @@ impl<'a> NamedPosterior<'a> {
 /// Text of `posterior.json` of a run, `None` if it has no posterior.
 pub(super) fn posterior_of_run(recording: &Recording, run: &RunRecord) -> Option<String> {
     Some(NamedPosterior::of_run(recording, run)?.json())
+}
+
+/// Text of `posterior.json` of the rig's first gimbal camera.
+#[cfg(test)]
+pub(super) fn posterior_text(posterior: &CalibrationPosterior, rig: &Rig, start_ns: i64, source: &str) -> String {
+    let cameras = vec![rig.cameras[0].key.clone()];
+    NamedPosterior { posterior, cameras, rig, prior: None, start_ns, source: source.to_owned() }.json()
 }
 
 /// Text of `posterior.json` of an offline calibration.
@@ -220,11 +245,37 @@ pub fn prior_of_run(recording: &Recording, run: &RunRecord, growth: f64) -> Opti
     Some(NamedPosterior::of_run(recording, run)?.prior(&recording.log_path, growth))
 }
 
+/// Calibration of a flight from the folder of its run or offline calibration.
+#[derive(Clone, Debug)]
+pub(super) struct FlightPosterior {
+    /// Keys of its cameras, the main one first.
+    pub(super) cameras: Vec<String>,
+    pub(super) joints: Vec<String>,
+    /// Names of the columns.
+    pub(super) names: Vec<String>,
+    pub(super) posterior: CalibrationPosterior,
+    /// Time of the first message of the log, in nanoseconds since 1970 by its clock.
+    pub(super) start_ns: Option<i64>,
+    /// Standard deviations under the rig's prior, then after each flight.
+    pub(super) flights: Vec<FlightSigmas>,
+    /// Rig with the values of the calibration.
+    pub(super) rig: Rig,
+}
+
 /// Reads the posterior of a run or an offline calibration from its folder; `growth` multiplies its standard deviations.
 ///
 /// # Errors
 /// If the folder has no posterior, or it is damaged or does not belong to the rig beside it.
 pub fn read_prior(folder: &Path, growth: f64) -> Result<FlightPrior, ExportError> {
+    let FlightPosterior { cameras, joints, posterior, flights, .. } = read_posterior(folder)?;
+    Ok(FlightPrior { folder: folder.to_owned(), cameras, joints, posterior, growth, history: flights })
+}
+
+/// Reads the posterior of a run or an offline calibration from its folder.
+///
+/// # Errors
+/// As [`read_prior`].
+pub(super) fn read_posterior(folder: &Path) -> Result<FlightPosterior, ExportError> {
     let path = folder.join(POSTERIOR);
     let refused = |problem: String| ExportError::Posterior { problem, path: path.clone() };
     if !path.is_file() {
@@ -242,13 +293,15 @@ pub fn read_prior(folder: &Path, growth: f64) -> Result<FlightPrior, ExportError
     }
     let rig = Rig::from_file(&folder.join(RIG))?;
     let posterior = posterior_of(&file, &rig).map_err(refused)?;
-    Ok(FlightPrior {
-        folder: folder.to_owned(),
+    let columns = file.cameras.iter().flat_map(|camera| &camera.columns);
+    Ok(FlightPosterior {
+        names: columns.map(|column| column.name.clone()).collect(),
         cameras: file.cameras.into_iter().map(|camera| camera.key).collect(),
         joints: file.joints,
         posterior,
-        growth,
-        history: file.flights,
+        start_ns: file.start_ns,
+        flights: file.flights,
+        rig,
     })
 }
 
@@ -262,7 +315,19 @@ fn posterior_of(file: &PosteriorFile, rig: &Rig) -> Result<CalibrationPosterior,
     let cameras: Vec<CameraPosterior> =
         numbered.map(|(entry, number)| camera_of(number, entry, rig)).collect::<Result<_, _>>()?;
     let count: usize = cameras.iter().map(|camera| camera.parameters.len()).sum();
-    let rows = &file.covariance;
+    let columns = file.cameras.iter().flat_map(|camera| &camera.columns);
+    let values_before: Option<Vec<f64>> = columns.map(|column| column.before).collect();
+    let covariance_before = file.covariance_before.as_ref().map(|rows| covariance_of(rows, count)).transpose()?;
+    let before = values_before.zip(covariance_before);
+    Ok(CalibrationPosterior {
+        cameras,
+        covariance: covariance_of(&file.covariance, count)?,
+        before: before.map(|(values, covariance)| ColumnBelief { values, covariance }),
+    })
+}
+
+/// Covariance of `count` columns by rows; the problem if it is none.
+fn covariance_of(rows: &[Vec<f64>], count: usize) -> Result<DMatrix<f64>, String> {
     if count == 0 || rows.len() != count || rows.iter().any(|row| row.len() != count) {
         return Err(format!("its covariance is not {count} × {count}, as its columns are"));
     }
@@ -271,7 +336,7 @@ fn posterior_of(file: &PosteriorFile, rig: &Rig) -> Result<CalibrationPosterior,
     if covariance.iter().any(|entry| !entry.is_finite()) || positive.cholesky().is_none() {
         return Err("its covariance is not positive definite".to_owned());
     }
-    Ok(CalibrationPosterior { cameras, covariance })
+    Ok(covariance)
 }
 
 /// Numbers of cameras in the names of parameters, the main camera first.

@@ -28,5 +28,5 @@ pub use so3::best_rotation;
 pub use split_mix::SplitMix64;
 pub use statistics::{
     MEDIAN_PLANAR_LENGTH, SIGMA_PER_MEDIAN, consecutive_correlation, correlation, f_survival, mean,
-    mean_square_quantile, median, quantile, standard_deviation, t_quantile,
+    mean_square_quantile, median, normal_quantile_of_chi_square, quantile, standard_deviation, t_quantile,
 };

@@ -72,6 +72,13 @@ pub fn mean_square_quantile(degrees_of_freedom: f64, normal_quantile: f64) -> f6
     (1.0 - ninth + normal_quantile * ninth.sqrt()).max(0.0).powi(3)
 }
 
+/// Quantile of the standard normal distribution that is exceeded as often as χ² exceeds a value, by the inverse of
+/// [`mean_square_quantile`], up to its degrees of freedom.
+pub fn normal_quantile_of_chi_square(chi_square: f64, degrees_of_freedom: f64) -> f64 {
+    let ninth = 2.0 / (9.0 * degrees_of_freedom);
+    ((chi_square / degrees_of_freedom).cbrt() - 1.0 + ninth) / ninth.sqrt()
+}
+
 /// Quantile of Student's t distribution, for a probability above one half; by bisection of the distribution function.
 pub fn t_quantile(probability: f64, degrees: f64) -> f64 {
     let (mut low, mut high) = (0.0, 1.0);

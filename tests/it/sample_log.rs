@@ -83,6 +83,20 @@ fn three_runs_leave_the_same_bytes_twice_and_stay_near_the_truth() {
         let output = dcvins(&arguments, "2");
         assert_eq!(output.status.code(), Some(3), "{}", String::from_utf8_lossy(&output.stderr));
     }
+    // The same flight twice: its calibrations agree, and the figure and the tables are written.
+    let history = folder.path().join("history");
+    let output = dcvins(&["history", text_of(&first), text_of(&second), "--out", text_of(&history)], "2");
+    let printed = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(output.status.success() && printed.starts_with("✓ 2 flights agree"), "{printed}");
+    assert!(printed.contains("camera cam0, run auto, parameterization minimal, 2 flights"), "{printed}");
+    assert_eq!(printed, fs::read_to_string(history.join("history.txt")).unwrap());
+    for name in ["history.json", "history.png", "history.svg", "values.csv", "results.csv"] {
+        assert!(fs::metadata(history.join(name)).unwrap().len() > 500, "{name}");
+    }
+    let output = dcvins(&["history", text_of(&first), "--run", "classical"], "2");
+    let refused = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{refused}");
+    assert!(refused.contains("parameterization is classical: a history compares minimal ones"), "{refused}");
     // Priors linearized at other values of the calibration contain spurious information.
     let text = fs::read_to_string(first.join("off/summary.json")).unwrap();
     let summary: Value = serde_json::from_str(&text).unwrap();

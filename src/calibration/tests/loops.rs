@@ -2,32 +2,15 @@
 
 use nalgebra::{DVector, UnitQuaternion, Vector3, Vector6};
 
+use super::random::Random;
 use crate::calibration::ChainDistance;
 use crate::calibration::border_prior::ChainTerm;
 use crate::calibration::pose_loop::{LoopNoise, LoopState, PairedSegment, PoseLoops, PosePair, SegmentFrame};
-use crate::geometry::{RigidTransform, SplitMix64, so3, wrap_angle};
+use crate::geometry::{RigidTransform, so3, wrap_angle};
 use crate::gimbal::{Chain, ClassicalChain, Parameterization, auto_parameterization};
 use crate::optimization::RobustLoss;
 use crate::sensors::{ChainPrior, JointAngles, JointMotionFit};
 use crate::simulation::{SyntheticOptions, synthetic_tracks};
-
-struct Random(SplitMix64);
-
-impl Random {
-    /// Uniform within ±1.
-    fn next(&mut self) -> f64 {
-        2.0 * self.0.next_unit() - 1.0
-    }
-
-    fn vector(&mut self, scale: f64) -> Vector3<f64> {
-        Vector3::from_fn(|_, _| self.next()) * scale
-    }
-
-    /// Approximately normal with this standard deviation.
-    fn normal(&mut self, sigma: f64) -> f64 {
-        (0..12).map(|_| 0.5 * self.next()).sum::<f64>() * sigma
-    }
-}
 
 struct Example {
     ground_truth: ClassicalChain,
@@ -41,7 +24,7 @@ fn example(seed: u64, encoder_sigma_rad: f64, noise: (f64, f64), still: bool) ->
     let flight =
         synthetic_tracks(&SyntheticOptions { seed, duration_s: 0.2, features: 1, ..SyntheticOptions::default() });
     let ground_truth = flight.true_rig.gimbal.unwrap().chain;
-    let mut random = Random(SplitMix64::new(seed));
+    let mut random = Random::new(seed);
     let minimal = Chain::from_classical(&ground_truth, Parameterization::MinimalYx);
     let parameters = minimal.parameters();
     let error = DVector::from_fn(minimal.dof(), |k, _| random.next() * parameters[k].scale());

@@ -5,3 +5,4 @@ mod derivatives;
 pub(super) mod fixture;
 mod flights;
 mod loops;
+pub(super) mod random;

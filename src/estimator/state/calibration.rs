@@ -217,6 +217,19 @@ impl Calibration {
         }
     }
 
+    /// This calibration with the values and the prior before any measurement of the run: of the rig, or of another flight.
+    pub(crate) fn before_measurements(&self) -> Self {
+        let given = self.given.before_measurements();
+        let of_rig = || DVector::zeros(self.sensors.len());
+        let sensors = given.earlier().map_or_else(of_rig, |earlier| earlier.expected.clone());
+        Self {
+            values: Values { chain: given.chain.clone(), sensors },
+            given: Arc::new(given.clone()),
+            first_estimate: None,
+            ..self.clone()
+        }
+    }
+
     /// Prior of the next pass over the same measurements. Mean: current estimate. Information:
     /// `Λ + weight·(covariance⁻¹ − Λ)` with `Λ` of the prior before the run's measurements.
     /// `None` when the covariance is not positive definite.

@@ -14,6 +14,15 @@ pub struct CalibrationPosterior {
     pub cameras: Vec<CameraPosterior>,
     /// Covariance of the columns of all cameras, in their order; in radians, metres, seconds and pixels.
     pub covariance: DMatrix<f64>,
+    /// Mean and covariance of the same columns before any measurement of the flight; `None` if a file does not hold them.
+    pub before: Option<ColumnBelief>,
+}
+
+/// Mean and covariance of the columns of a calibration, in radians, metres, seconds and pixels.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ColumnBelief {
+    pub values: Vec<f64>,
+    pub covariance: DMatrix<f64>,
 }
 
 /// Calibration of one camera: its chain, then time offsets, shutter and intrinsics.

@@ -5,7 +5,7 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 
 use super::calibration::Calibration;
-use super::calibration_posterior::CalibrationPosterior;
+use super::calibration_posterior::{CalibrationPosterior, CameraPosterior, ColumnBelief};
 use super::earlier_pass::FoundCamera;
 use super::imu_calibration::ImuCalibration;
 use super::imu_errors::{self, ImuErrors};
@@ -59,10 +59,22 @@ impl Calibrations {
 
     /// Values of all cameras with the `covariance` of all free columns; `None` if the calibration is fixed.
     pub(crate) fn posterior(&self, covariance: &DMatrix<f64>) -> Option<CalibrationPosterior> {
-        let count: usize = self.cameras.iter().map(Calibration::dof).sum();
+        let count = self.camera_columns();
         if count == 0 || count > covariance.nrows() {
             return None;
         }
+        let (cameras, covariance) = self.in_reported_columns(covariance);
+        Some(CalibrationPosterior { cameras, covariance, before: self.before_measurements() })
+    }
+
+    /// Number of columns of all cameras.
+    fn camera_columns(&self) -> usize {
+        self.cameras.iter().map(Calibration::dof).sum()
+    }
+
+    /// Values of all cameras with the covariance of the columns in which another flight takes them.
+    fn in_reported_columns(&self, covariance: &DMatrix<f64>) -> (Vec<CameraPosterior>, DMatrix<f64>) {
+        let count = self.camera_columns();
         let (mut cameras, mut by_estimate) = (Vec::new(), DMatrix::identity(count, count));
         for (camera, one) in self.cameras.iter().enumerate() {
             let (posterior, by_columns) = one.posterior();
@@ -71,7 +83,17 @@ impl Calibrations {
             cameras.push(posterior);
         }
         let own = covariance.view((0, 0), (count, count));
-        Some(CalibrationPosterior { cameras, covariance: &by_estimate * own * by_estimate.transpose() })
+        (cameras, &by_estimate * own * by_estimate.transpose())
+    }
+
+    /// Values of all cameras and their covariance before any measurement of the run.
+    fn before_measurements(&self) -> Option<ColumnBelief> {
+        let cameras = self.cameras.iter().map(Calibration::before_measurements).collect();
+        let before = Self { cameras, ..self.clone() };
+        let whitening = before.prior_jacobian();
+        let covariance = whitening.tr_mul(&whitening).cholesky()?.inverse();
+        let (cameras, covariance) = before.in_reported_columns(&covariance);
+        Some(ColumnBelief { values: cameras.into_iter().flat_map(|camera| camera.values).collect(), covariance })
     }
 
     /// These calibrations with all columns of `wanted`.

@@ -55,7 +55,11 @@ fn a_line_names_the_flights_of_the_prior() {
         folder: "second/minimal".into(),
         cameras: Vec::new(),
         joints: Vec::new(),
-        posterior: CalibrationPosterior { cameras: Vec::new(), covariance: nalgebra::DMatrix::zeros(0, 0) },
+        posterior: CalibrationPosterior {
+            cameras: Vec::new(),
+            covariance: nalgebra::DMatrix::zeros(0, 0),
+            before: None,
+        },
         growth: 2.0,
         history: ["rig", "first.mcap (minimal)", "second.mcap (minimal)"].map(flight).to_vec(),
     };

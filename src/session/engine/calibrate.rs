@@ -349,10 +349,16 @@ pub(super) fn earlier_flights(
 /// Posterior with the time offsets of its cameras instead of their changes against the rig; `cameras` are in its order.
 pub(super) fn with_absolute_shifts(posterior: &CalibrationPosterior, cameras: [&CameraRig; 2]) -> CalibrationPosterior {
     let mut absolute = posterior.clone();
+    let mut before = absolute.before.iter_mut().flat_map(|before| &mut before.values);
     for (found, camera) in absolute.cameras.iter_mut().zip(cameras) {
-        let columns = found.parameters.iter().zip(&mut found.values);
-        for (_, shift_s) in columns.filter(|(parameter, _)| **parameter == ParameterId::timeshift(0)) {
-            *shift_s += camera.timeshift_cam_imu_s;
+        let given_shift = |parameter: &ParameterId| {
+            if *parameter == ParameterId::timeshift(0) { camera.timeshift_cam_imu_s } else { 0.0 }
+        };
+        for (parameter, value) in found.parameters.iter().zip(&mut found.values) {
+            *value += given_shift(parameter);
+            if let Some(before) = before.next() {
+                *before += given_shift(parameter);
+            }
         }
     }
     absolute

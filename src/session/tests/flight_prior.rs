@@ -86,6 +86,18 @@ fn two_flights_add_up_and_their_order_matters_little() {
         assert!(errors < 2.0, "{errors} σ RMS");
         assert_eq!(posterior.cameras[0].rig_sigmas, alone[0].cameras[0].rig_sigmas, "the rig stays the reference");
     }
+    // Known before a flight is the rig, or the flight before it.
+    let before = |posterior: &CalibrationPosterior| posterior.before.clone().unwrap();
+    let of_rig = before(&alone[0]);
+    for (variance, sigma) in of_rig.covariance.diagonal().iter().zip(&alone[0].cameras[0].rig_sigmas) {
+        assert!((variance.sqrt() / sigma - 1.0).abs() < 1e-6, "{} {sigma}", variance.sqrt());
+    }
+    let of_flight = before(&both[0]);
+    for (value, expected) in of_flight.values.iter().zip(&alone[0].cameras[0].values) {
+        assert!((value - expected).abs() < 1e-9, "{value} {expected}");
+    }
+    let difference = &of_flight.covariance - &alone[0].covariance;
+    assert!(difference.norm() < 1e-6 * of_flight.covariance.norm(), "{}", difference.norm());
 }
 
 #[test]
