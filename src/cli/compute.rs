@@ -1,5 +1,7 @@
 //! The estimation of `run`, `view`, `screenshot` and `report`, with a progress bar.
 
+use std::fmt::{self, Display, Formatter};
+
 use anyhow::{Result, bail};
 use dcvins::geometry::seconds_from_ns;
 use dcvins::session::breakpoints::Condition;
@@ -16,6 +18,46 @@ pub(crate) fn compute(plan: &SessionPlan) -> Result<Computation> {
     let computation = session::compute(plan, &mut |recording| {
         let (pass, now_s) = progress_of(recording);
         progress.show((now_s - begin_s) / (end_s - begin_s).max(1e-3), || format!("{pass}{now_s:.1} of {end_s:.1} s"));
+    })?;
+    plan.log.require_unshortened()?;
+    Ok(computation)
+}
+
+/// Log time by which a run is behind the log that it follows, at its steps.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Delay {
+    steps: usize,
+    sum_s: f64,
+    largest_s: f64,
+}
+
+impl Delay {
+    fn add(&mut self, delay_s: f64) {
+        self.steps += 1;
+        self.sum_s += delay_s;
+        self.largest_s = self.largest_s.max(delay_s);
+    }
+}
+
+impl Display for Delay {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let mean_s = self.sum_s / self.steps.max(1) as f64;
+        write!(f, "{mean_s:.2} s behind it on average, {:.2} s at most", self.largest_s)
+    }
+}
+
+/// Runs the estimators of a plan on a log that is being written, to its end.
+pub(crate) fn compute_following(plan: &SessionPlan, delay: &mut Delay) -> Result<Computation> {
+    let progress = Progress::spinner("following the log");
+    let mut reached_s = 0.0;
+    let computation = session::compute(plan, &mut |recording| {
+        let (_, now_s) = progress_of(recording);
+        let log_s = seconds_from_ns(plan.log.duration_ns());
+        if now_s > reached_s {
+            reached_s = now_s;
+            delay.add((log_s - now_s).max(0.0));
+        }
+        progress.show(0.0, || format!("{now_s:.1} of {log_s:.1} s so far"));
     })?;
     plan.log.require_unshortened()?;
     Ok(computation)

@@ -3,6 +3,7 @@
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::Duration;
 
 use dcvins::export::{
     ConvertedLogs, LogSources, PreparedLog, SourceError, check_log, is_session, open_session, prepare_log,
@@ -19,6 +20,8 @@ use crate::cli::estimation_arguments::EstimationArguments;
 use crate::cli::prepared_log::{converted_logs, stage_text};
 use crate::cli::result_cache::CacheArguments;
 
+/// Time between two looks for a file that does not exist yet.
+const FILE_POLL: Duration = Duration::from_millis(100);
 /// Largest number of notes of a conversion that are shown; its report has all.
 const SHOWN_NOTES: usize = 3;
 
@@ -32,6 +35,9 @@ pub(crate) fn open_log(
     progress: &mut dyn FnMut(OpenProgress) -> ControlFlow<()>,
 ) -> Result<OpenedLog, OpenFailure> {
     let limits = estimation.limits.limits();
+    if estimation.follow {
+        wait_for_file(&request.sources, progress)?;
+    }
     let sources = LogSources::gather(&request.sources, &limits).map_err(|error| failure(&error))?;
     let cache = converted_logs();
     if is_session(&sources.main) {
@@ -67,7 +73,10 @@ pub(crate) fn open_log(
     }
     let started = SessionPlan::open(&session_request).and_then(|plan| {
         let mut session = Session::start(plan)?;
-        check(&mut session)?;
+        // A check needs the complete log.
+        if !estimation.follow {
+            check(&mut session)?;
+        }
         Ok(session)
     });
     match started {
@@ -82,6 +91,22 @@ pub(crate) fn open_log(
         }
         Err(error) => Err(OpenFailure::Problem(error.to_string())),
     }
+}
+
+/// Waits until the first file of a log that will be written is there.
+fn wait_for_file(
+    sources: &[PathBuf],
+    progress: &mut dyn FnMut(OpenProgress) -> ControlFlow<()>,
+) -> Result<(), OpenFailure> {
+    let Some(path) = sources.first() else { return Ok(()) };
+    while path.metadata().is_ok_and(|metadata| metadata.len() == 0) || !path.exists() {
+        let text = format!("Waiting for {}", log_name(path));
+        if progress(OpenProgress { text, ratio: 0.0 }).is_break() {
+            return Err(OpenFailure::Cancelled);
+        }
+        std::thread::sleep(FILE_POLL);
+    }
+    Ok(())
 }
 
 /// Checks the log of a session in the background.

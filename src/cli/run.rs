@@ -8,10 +8,10 @@ use clap::Args;
 use dcvins::export::{self, RunFileOptions};
 use dcvins::geometry::seconds_from_ns;
 use dcvins::session::breakpoints::Condition;
-use dcvins::session::{BreakpointHit, Recording, RunRecord, RunSummary, SessionPlan};
+use dcvins::session::{BreakpointHit, Recording, RunRecord, RunSummary, SessionPlan, SessionRequest, StopFlag};
 use dcvins::text::log_name;
 
-use crate::cli::compute::{compute, compute_until};
+use crate::cli::compute::{Delay, compute, compute_following, compute_until};
 use crate::cli::estimation_arguments::EstimationArguments;
 use crate::cli::exit::ExitOutcome;
 use crate::cli::interrupt::Interrupt;
@@ -19,7 +19,7 @@ use crate::cli::log_checking::beside_check;
 use crate::cli::prepared_log::prepared_log;
 use crate::cli::result_cache::CacheArguments;
 use crate::cli::run_summary::{describe, describe_trajectory};
-use crate::cli::terminal::{notify, print, print_json};
+use crate::cli::terminal::{Progress, notify, print, print_json};
 
 #[derive(Args, Clone, Debug)]
 pub(crate) struct RunArguments {
@@ -36,6 +36,10 @@ pub(crate) struct RunArguments {
     /// step and print the values; docs/manual.md lists the quantities.
     #[arg(long = "break", value_name = "CONDITION", value_parser = condition)]
     pub break_at: Option<Condition>,
+    /// Follow a log that another program is writing: the run begins with its first seconds and ends with its footer, half a
+    /// minute after the last message, or at Ctrl+C.
+    #[arg(long, conflicts_with_all = ["break_at", "start", "duration"])]
+    pub follow: bool,
     /// Omit measured times from frames.csv and summary.json, so that two runs give the same bytes in every file.
     #[arg(long)]
     pub no_timing: bool,
@@ -66,12 +70,18 @@ fn condition(text: &str) -> Result<Condition, String> {
 const SUMMARY_BUDGET_BYTES: usize = 16 << 20;
 
 pub(crate) fn run(arguments: &RunArguments) -> Result<ExitOutcome> {
-    let (log, estimation) = prepared_log(std::slice::from_ref(&arguments.log), &arguments.estimation)?;
+    let interrupt = Interrupt::watch()?;
+    let (log, estimation) = if arguments.follow {
+        (arguments.log.clone(), arguments.estimation.clone())
+    } else {
+        prepared_log(std::slice::from_ref(&arguments.log), &arguments.estimation)?
+    };
     let arguments = &RunArguments { log, estimation, ..arguments.clone() };
-    let plan = SessionPlan::open(&arguments.estimation.request(arguments.log.clone())?)?;
+    let request = arguments.estimation.request(arguments.log.clone())?;
+    let following = arguments.follow.then(|| StopFlag(interrupt.flag()));
+    let plan = SessionPlan::open(&SessionRequest { following, ..request.clone() })?;
     let labels: Vec<&str> = plan.runs.iter().map(|(spec, _)| spec.label.as_str()).collect();
     export::check_run_folders(&arguments.out, &labels, &arguments.log, arguments.force)?;
-    let interrupt = Interrupt::watch()?;
     // Complete steps are needed for results.mcap and for the conditions of `--break`; all other files need only
     // summaries.
     let needs_whole_steps = arguments.mcap || arguments.break_at.is_some();
@@ -81,7 +91,9 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitOutcome> {
         Some(condition) => compute_until(&plan, condition),
         None => Ok((compute(&plan)?.into_recording(), None)),
     };
-    let (recording, hit) = if arguments.no_check {
+    let (recording, hit) = if arguments.follow {
+        (follow(arguments, &plan, &request)?, None)
+    } else if arguments.no_check {
         estimate()?
     } else {
         let (computed, checked) = beside_check(&plan, &arguments.cache, estimate);
@@ -153,6 +165,25 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitOutcome> {
     } else {
         ExitOutcome::Success
     })
+}
+
+/// Runs on a log while it is being written, then checks the complete log.
+fn follow(arguments: &RunArguments, plan: &SessionPlan, request: &SessionRequest) -> Result<Recording> {
+    let mut delay = Delay::default();
+    let computation = compute_following(plan, &mut delay)?;
+    if let Some(warning) = plan.log.end_warning() {
+        notify(&format!("dcvins: {}", warning.message));
+    }
+    notify(&format!("dcvins: followed {:.1} s of log, {delay}", seconds_from_ns(plan.log.duration_ns())));
+    // The plan has topics, rates and ground truth of the first seconds.
+    let complete = SessionPlan::open(request)?;
+    let recording = computation.into_recording().of_complete_log(&complete);
+    if arguments.no_check {
+        return Ok(recording);
+    }
+    let _progress = Progress::spinner("checking the log");
+    let checked = export::check_log(arguments.cache.cache().as_ref(), &complete.log, &complete.rig);
+    Ok(Recording { check: Some(Arc::new(checked.findings)), ..recording })
 }
 
 /// Notice about the computed part of an interrupted command.

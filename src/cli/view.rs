@@ -19,6 +19,9 @@ pub(crate) struct ViewArguments {
     /// Start with the tour: six steps on the log, or on the sample flight without a log.
     #[arg(long)]
     pub tour: bool,
+    /// Follow a log that another program is writing: steps appear as it grows. The log is not checked meanwhile.
+    #[arg(long, conflicts_with_all = ["tour", "start", "duration"])]
+    pub follow: bool,
     #[command(flatten)]
     pub estimation: EstimationArguments,
 }
@@ -67,7 +70,7 @@ mod window {
         let given = arguments.sources.first().map(PathBuf::as_path);
         let alone = given.filter(|_| arguments.sources.len() == 1);
         let study = alone.filter(|path| is_study(path)).map(OpenedStudy::read).transpose()?.map(Arc::new);
-        if study.is_none() && given.is_some() {
+        if study.is_none() && given.is_some() && !arguments.follow {
             let sources = LogSources::gather(&arguments.sources, &arguments.estimation.limits.limits())?;
             if is_session(&sources.main) {
                 arguments.estimation.check_for_session()?;
@@ -76,7 +79,7 @@ mod window {
                 check_log(&sources, &arguments.estimation)?;
             }
         }
-        let estimation = arguments.estimation.clone();
+        let estimation = EstimationArguments { follow: arguments.follow, ..arguments.estimation.clone() };
         let open_log: OpenLog = Arc::new(move |request, progress| open_log(request, &estimation, progress));
         let first_study = Mutex::new(study.clone().zip(given.map(Path::to_owned)));
         let open_study = move |path: &Path| {

@@ -24,6 +24,7 @@ mod writer;
 pub use self::error::LogError;
 pub use self::images::reader::ImageReader;
 pub use self::log::FlightLog;
+pub use self::log::following::LogEnd;
 pub use self::log::topic_info::TopicInfo;
 pub use self::messages::MessageKind;
 pub use self::rig::template as rig_template;

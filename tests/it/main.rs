@@ -9,6 +9,7 @@ mod dependencies;
 mod documentation;
 mod evaluate;
 mod flights;
+mod follow;
 mod hostile_logs;
 mod imports;
 mod layering;

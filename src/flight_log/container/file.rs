@@ -2,6 +2,7 @@ use std::fs::File;
 use std::io::{self, BufReader, Read as _, Seek as _, SeekFrom, Write as _};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::files::{LimitExceeded, LimitKind, LogLimits};
 use crate::flight_log::LogError;
@@ -17,8 +18,8 @@ const UNPACK_BYTES: usize = 1 << 20;
 #[derive(Debug)]
 pub(crate) struct LogFile {
     file: File,
-    /// In bytes, when the file was opened.
-    length: usize,
+    /// In bytes, when the file was opened, or when a log that is being written was looked at last.
+    length: AtomicUsize,
     limits: LogLimits,
 }
 
@@ -50,12 +51,18 @@ impl LogFile {
         }
         let length = file.metadata().map_err(failed)?.len();
         let length = usize::try_from(length).map_err(|error| failed(io::Error::other(error)))?;
-        Ok(Self { file, length, limits: limits.clone() })
+        Ok(Self { file, length: AtomicUsize::new(length), limits: limits.clone() })
     }
 
-    /// Length in bytes when the file was opened.
+    /// Length in bytes when the file was opened, or looked at last.
     pub(crate) fn len(&self) -> usize {
-        self.length
+        self.length.load(Ordering::Acquire)
+    }
+
+    /// Looks at the length of a file that is being written; true if it has grown.
+    pub(crate) fn grow(&self) -> bool {
+        let now = self.file.metadata().map_or(0, |metadata| usize::try_from(metadata.len()).unwrap_or(0));
+        self.length.fetch_max(now, Ordering::AcqRel) < now
     }
 
     /// Limits that apply to reading the file.
@@ -66,8 +73,8 @@ impl LogFile {
     /// Reads a range of bytes, at most the size of a record; the error is a description of the problem.
     pub(crate) fn read(&self, range: Range<usize>) -> Result<Vec<u8>, String> {
         let length = range.end.saturating_sub(range.start);
-        if range.end > self.length {
-            return Err(format!("bytes {} to {} of a file of {}", range.start, range.end, self.length));
+        if range.end > self.len() {
+            return Err(format!("bytes {} to {} of a file of {}", range.start, range.end, self.len()));
         }
         self.limits.check_record("a record", length as u64, length as u64).map_err(|error| error.to_string())?;
         let mut bytes = Vec::new();
@@ -97,7 +104,7 @@ impl LogFile {
     fn shrunk(&self, end: usize) -> String {
         format!(
             "the file was shortened while it was open: it ends at byte {end} and had {} bytes when it was opened",
-            self.length
+            self.len()
         )
     }
 
@@ -105,7 +112,7 @@ impl LogFile {
     pub(crate) fn require_unshortened(&self, path: &Path) -> Result<(), LogError> {
         let failed = |source| LogError::Io { action: "read the log", source, path: path.to_owned() };
         let now = self.file.metadata().map_err(failed)?.len();
-        if now < self.length as u64 {
+        if now < self.len() as u64 {
             let problem = self.shrunk(now as usize);
             return Err(LogError::Shortened { problem, path: path.to_owned() });
         }

@@ -81,6 +81,33 @@ enum Entries {
     Scanned(Vec<(u64, u64)>),
 }
 
+/// Place of a scan that goes on when more of the file has been written.
+#[derive(Debug)]
+pub(crate) struct ScanState {
+    /// Start of the next record in the file.
+    position: usize,
+    definitions: Definitions,
+}
+
+impl Default for ScanState {
+    fn default() -> Self {
+        Self { position: MAGIC.len(), definitions: Definitions::default() }
+    }
+}
+
+/// Reason why a scan has stopped.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum ScanEnd {
+    /// At the footer: the log is complete.
+    Footer,
+    /// At the end of the file, between two records.
+    EndOfFile,
+    /// At a record that is not complete, or at zeros; with the problem.
+    Incomplete(String),
+    /// At a limit, which is reported.
+    Limit,
+}
+
 /// Blocks, channels and messages of an MCAP file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct ContainerIndex {
@@ -88,7 +115,9 @@ pub(crate) struct ContainerIndex {
     pub(crate) channels: BTreeMap<u16, ChannelRecord>,
     /// In the order of the file.
     pub(crate) blocks: Vec<Block>,
-    entries: Vec<BTreeMap<u16, Entries>>,
+    entries: Vec<Arc<BTreeMap<u16, Entries>>>,
+    /// True if messages outside of chunks may be added to the last block.
+    extends_last: bool,
     pub(crate) attachments: Vec<AttachmentRef>,
     /// Number of messages by channel, by the file's statistics.
     pub(crate) statistics: Option<BTreeMap<u16, u64>>,
@@ -110,7 +139,7 @@ impl ContainerIndex {
             Err(reason) => {
                 let mut index = Self::from_scan(file);
                 if let Some(problem) = reason {
-                    let after_log_time_ns = index.blocks.iter().map(|block| block.log_time_ns.1).max().unwrap_or(0);
+                    let after_log_time_ns = index.last_log_time_ns();
                     // A truncated file has no index either, so only the truncation is reported.
                     if index.damages.is_empty() {
                         index.damages.push(Damage { byte: file.len(), after_log_time_ns, problem });
@@ -166,11 +195,9 @@ impl ContainerIndex {
                     let log_time_ns = (chunk.message_start_time, chunk.message_end_time);
                     index.blocks.push(Block { bytes, is_chunk: true, log_time_ns });
                     let offsets = chunk.message_index_offsets.iter();
-                    index.entries.push(
-                        offsets
-                            .filter_map(|(id, at)| Some((*id, Entries::Record(usize::try_from(*at).ok()?))))
-                            .collect(),
-                    );
+                    let entries =
+                        offsets.filter_map(|(id, at)| Some((*id, Entries::Record(usize::try_from(*at).ok()?))));
+                    index.entries.push(Arc::new(entries.collect()));
                 }
                 Some(Record::AttachmentIndex(attachment)) => {
                     if let Some(bytes) = chunk_bytes(attachment.offset, attachment.length) {
@@ -201,7 +228,7 @@ impl ContainerIndex {
         let mut order: Vec<usize> = (0..index.blocks.len()).collect();
         order.sort_by_key(|number| index.blocks[*number].bytes.start);
         index.blocks = order.iter().map(|number| index.blocks[*number].clone()).collect();
-        index.entries = order.iter().map(|number| std::mem::take(&mut index.entries[*number])).collect();
+        index.entries = order.iter().map(|number| Arc::clone(&index.entries[*number])).collect();
         if let Some(pair) = index.blocks.windows(2).find(|pair| pair[1].bytes.start < pair[0].bytes.end) {
             return Err(Some(format!("the index places two chunks at byte {}", pair[1].bytes.start)));
         }
@@ -220,63 +247,67 @@ impl ContainerIndex {
 
     /// Scans all records once.
     fn from_scan(file: &LogFile) -> Self {
-        let mut index = Self::default();
-        let mut definitions = Definitions::default();
+        let (mut index, mut state) = (Self::default(), ScanState::default());
+        if let ScanEnd::Incomplete(problem) = index.scan(file, &mut state) {
+            index.scan_cut_chunk(file, state.position, &mut state.definitions);
+            index.report(state.position, problem);
+        }
+        index
+    }
+
+    /// Adds the complete records after the place of the scan.
+    pub(crate) fn scan(&mut self, file: &LogFile, state: &mut ScanState) -> ScanEnd {
+        let ScanState { position: next, definitions } = state;
         let mut window = FileWindow::new(file);
-        let mut position = MAGIC.len();
-        while position < file.len() {
+        // Blocks of an earlier part have been read by now.
+        self.extends_last = false;
+        while *next < file.len() {
+            let position = *next;
             let (opcode, body) = match record_in_file(&mut window, file, position) {
                 Ok(record) => record,
-                Err(problem) => {
-                    index.scan_cut_chunk(file, position, &mut definitions);
-                    index.report(position, problem);
-                    return index;
-                }
+                Err(problem) => return ScanEnd::Incomplete(problem),
             };
             let end = body.end;
             match opcode {
-                op::CHUNK => index.scan_chunk(file, position..end, &mut definitions),
+                op::CHUNK => self.scan_chunk(file, position..end, definitions),
                 op::MESSAGE => {
                     let header = window.read(body.start..body.end.min(body.start + MESSAGE_HEADER));
-                    index.scan_plain_message(position, end, header.unwrap_or_default());
+                    self.scan_plain_message(position, end, header.unwrap_or_default());
                 }
                 // Entries of readable blocks exist already; only the counts of damaged blocks are needed.
                 op::MESSAGE_INDEX => {
                     if let Ok(head) = window.read(body.start..body.end.min(body.start + MESSAGE_INDEX_HEAD)) {
-                        index.scan_message_index(head);
+                        self.scan_message_index(head);
                     }
                 }
-                op::FOOTER => return index,
+                op::FOOTER => return ScanEnd::Footer,
                 op::ATTACHMENT => {
                     match file.read(body).map(|body| attachment(&body).map(|(name, _)| name.to_owned())) {
-                        Ok(Some(name)) => index.attachments.push(AttachmentRef { name, bytes: position..end }),
-                        Ok(None) => index.report(position, "a damaged attachment".into()),
-                        Err(problem) => index.report(position, problem),
+                        Ok(Some(name)) => self.attachments.push(AttachmentRef { name, bytes: position..end }),
+                        Ok(None) => self.report(position, "a damaged attachment".into()),
+                        Err(problem) => self.report(position, problem),
                     }
                 }
                 op::HEADER | op::SCHEMA | op::CHANNEL => match file.read(body) {
                     Ok(body) => match parse_definition(opcode, &body) {
-                        Some(Record::Header(header)) => index.profile = header.profile,
-                        Some(other) => index.define(file, &mut definitions, &other, position),
-                        None => index.report(position, format!("a damaged record (opcode {opcode:#04x})")),
+                        Some(Record::Header(header)) => self.profile = header.profile,
+                        Some(other) => self.define(file, definitions, &other, position),
+                        None => self.report(position, format!("a damaged record (opcode {opcode:#04x})")),
                     },
-                    Err(problem) => index.report(position, problem),
+                    Err(problem) => self.report(position, problem),
                 },
-                0 => {
-                    index.report(position, "zeros instead of a record".into());
-                    return index;
-                }
+                0 => return ScanEnd::Incomplete("zeros instead of a record".into()),
                 _ => {}
             }
             let allowed = file.limits().messages(file.len() as u64);
-            if index.scanned_messages > allowed {
-                let (kind, subject, found) = (LimitKind::Messages, "a log", index.scanned_messages);
-                index.report(position, LimitExceeded { kind, subject, found, allowed }.to_string());
-                return index;
+            if self.scanned_messages > allowed {
+                let (kind, subject, found) = (LimitKind::Messages, "a log", self.scanned_messages);
+                self.report(position, LimitExceeded { kind, subject, found, allowed }.to_string());
+                return ScanEnd::Limit;
             }
-            position = end;
+            *next = end;
         }
-        index
+        ScanEnd::EndOfFile
     }
 
     fn scan_chunk(&mut self, file: &LogFile, bytes: Range<usize>, definitions: &mut Definitions) {
@@ -311,7 +342,7 @@ impl ContainerIndex {
             self.scanned_promises.insert(self.blocks.len(), BTreeMap::new());
         }
         self.blocks.push(block);
-        self.entries.push(entries);
+        self.entries.push(Arc::new(entries));
     }
 
     /// Stores the number of messages of a message index record after a damaged chunk.
@@ -341,9 +372,10 @@ impl ContainerIndex {
         let grows = self.blocks.last().is_some_and(|block| {
             !block.is_chunk && block.bytes.end == position && position - block.bytes.start < PLAIN_BLOCK_BYTES
         });
-        if !grows {
+        if !grows || !self.extends_last {
             self.blocks.push(Block { bytes: position..end, is_chunk: false, log_time_ns: (log_time_ns, log_time_ns) });
-            self.entries.push(BTreeMap::new());
+            self.entries.push(Arc::default());
+            self.extends_last = true;
         }
         self.scanned_messages += 1;
         if let (Some(block), Some(entries)) = (self.blocks.last_mut(), self.entries.last_mut()) {
@@ -351,6 +383,7 @@ impl ContainerIndex {
             block.log_time_ns.0 = block.log_time_ns.0.min(log_time_ns);
             block.log_time_ns.1 = block.log_time_ns.1.max(log_time_ns);
             let offset = (position - block.bytes.start) as u64;
+            let entries = Arc::make_mut(entries);
             if let Entries::Scanned(list) = entries.entry(channel_id).or_insert_with(|| Entries::Scanned(Vec::new())) {
                 list.push((log_time_ns, offset));
             }
@@ -405,8 +438,19 @@ impl ContainerIndex {
         }
     }
 
+    /// Time from the first to the last message.
+    pub(crate) fn span_ns(&self) -> u64 {
+        let first = self.blocks.iter().map(|block| block.log_time_ns.0).min().unwrap_or(0);
+        self.last_log_time_ns() - first
+    }
+
+    /// Largest log time, 0 without messages.
+    pub(crate) fn last_log_time_ns(&self) -> u64 {
+        self.blocks.iter().map(|block| block.log_time_ns.1).max().unwrap_or(0)
+    }
+
     fn report(&mut self, byte: usize, problem: String) {
-        let after_log_time_ns = self.blocks.iter().map(|block| block.log_time_ns.1).max().unwrap_or(0);
+        let after_log_time_ns = self.last_log_time_ns();
         self.damages.push(Damage { byte, after_log_time_ns, problem });
     }
 
@@ -417,10 +461,10 @@ impl ContainerIndex {
         attachment(record.body).map(|(_, content)| content.to_vec())
     }
 
-    /// Numbers of the blocks with messages of some channels.
-    pub(super) fn blocks_with(&self, channel_ids: &[u16]) -> Vec<usize> {
-        let has = |entries: &BTreeMap<u16, Entries>| channel_ids.iter().any(|id| entries.contains_key(id));
-        self.entries.iter().enumerate().filter(|(_, entries)| has(entries)).map(|(number, _)| number).collect()
+    /// Numbers of the blocks from one on with messages of some channels.
+    pub(super) fn blocks_with(&self, channel_ids: &[u16], from: usize) -> Vec<usize> {
+        let has = |number: &usize| channel_ids.iter().any(|id| self.entries[*number].contains_key(id));
+        (from..self.blocks.len()).filter(has).collect()
     }
 
     /// Positions of the messages of some channels in some blocks, in the order of their log times.

@@ -9,7 +9,7 @@ mod unpack;
 use std::ops::Range;
 
 pub(crate) use block::{BlockCache, DecodedBlock, MessageSpan};
-pub(super) use index::{ChannelRecord, ContainerIndex, MessagePosition};
+pub(super) use index::{ChannelRecord, ContainerIndex, MessagePosition, ScanEnd, ScanState};
 pub(super) use topic::TopicIndex;
 pub(super) use unpack::unpack_message;
 

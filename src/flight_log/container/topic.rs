@@ -10,28 +10,56 @@ pub(crate) struct TopicIndex {
     groups: Vec<Vec<usize>>,
     /// Index of the first group that is not in `loaded`.
     next_group: usize,
+    /// Number of blocks of the log that have been looked at.
+    known_blocks: usize,
     loaded: Vec<MessagePosition>,
 }
 
 impl TopicIndex {
     pub(crate) fn new(index: &ContainerIndex, channel_ids: &[u16]) -> Self {
-        let mut blocks = index.blocks_with(channel_ids);
+        let mut topic = Self {
+            channel_ids: channel_ids.to_vec(),
+            groups: Vec::new(),
+            next_group: 0,
+            known_blocks: 0,
+            loaded: Vec::new(),
+        };
+        topic.extend(index);
+        topic
+    }
+
+    /// Adds the blocks that the log has got since the last call; they follow the messages before them.
+    fn extend(&mut self, index: &ContainerIndex) {
+        let mut blocks = index.blocks_with(&self.channel_ids, self.known_blocks);
+        self.known_blocks = index.blocks.len();
         blocks.sort_by_key(|number| (index.blocks[*number].log_time_ns.0, *number));
-        let mut groups: Vec<Vec<usize>> = Vec::new();
+        let earlier = self.groups.len();
         let mut group_end_ns = 0;
         for number in blocks {
             let (first_ns, last_ns) = index.blocks[number].log_time_ns;
-            match groups.last_mut() {
+            match self.groups[earlier..].last_mut() {
                 Some(group) if first_ns < group_end_ns => group.push(number),
-                _ => groups.push(vec![number]),
+                _ => self.groups.push(vec![number]),
             }
             group_end_ns = group_end_ns.max(last_ns);
         }
-        Self { channel_ids: channel_ids.to_vec(), groups, next_group: 0, loaded: Vec::new() }
+    }
+
+    /// Number of blocks of the log that have been looked at.
+    pub(crate) fn known_blocks(&self) -> usize {
+        self.known_blocks
+    }
+
+    /// Log time of the last message so far.
+    pub(crate) fn last_log_time_ns(&self) -> Option<u64> {
+        self.loaded.last().map(|position| position.log_time_ns)
     }
 
     /// Position of a message, counted from the first one (or from the position of [`TopicIndex::skip_to`]).
     pub(crate) fn get(&mut self, index: &ContainerIndex, file: &LogFile, number: usize) -> Option<MessagePosition> {
+        if self.known_blocks < index.blocks.len() {
+            self.extend(index);
+        }
         while self.loaded.len() <= number && self.load_group(index, file) {}
         self.loaded.get(number).copied()
     }

@@ -31,9 +31,9 @@ pub(crate) fn grey_levels_of_topic(log: &FlightLog, topic: &str, kind: MessageKi
 /// start of the log. Unreadable and black images are left out.
 fn sampled(log: &FlightLog, topic: &str, kind: MessageKind) -> Vec<(i64, Vec<ValueRange>)> {
     let mut positions = log.topic_index(topic);
-    let count = positions.count(log.index(), log.file());
+    let count = positions.count(&log.index(), log.file());
     let mut time_ns = |number: usize| {
-        positions.get(log.index(), log.file(), number).map(|position| log.since_start(position.log_time_ns))
+        positions.get(&log.index(), log.file(), number).map(|position| log.since_start(position.log_time_ns))
     };
     let ends = (time_ns(0), time_ns(count.saturating_sub(1)));
     let (Some(first_ns), Some(last_ns)) = ends else { return Vec::new() };
@@ -48,13 +48,13 @@ fn sampled(log: &FlightLog, topic: &str, kind: MessageKind) -> Vec<(i64, Vec<Val
         numbers.dedup();
         let mut ranges = Vec::new();
         for number in numbers {
-            let Some(position) = positions.get(log.index(), log.file(), number) else { continue };
+            let Some(position) = positions.get(&log.index(), log.file(), number) else { continue };
             let Some((block, message)) = log.message(&mut cache, position) else { continue };
             if let Some(WideValues::Of(values)) = wide_values(kind, block.bytes(&message.data), limits) {
                 ranges.extend(ValueRange::of(&values));
             }
         }
-        let middle = positions.get(log.index(), log.file(), usize::midpoint(from, to))?;
+        let middle = positions.get(&log.index(), log.file(), usize::midpoint(from, to))?;
         Some((log.since_start(middle.log_time_ns), ranges))
     };
     (0..stretches).filter_map(&mut of_stretch).collect()

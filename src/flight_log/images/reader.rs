@@ -112,7 +112,7 @@ impl ImageReader {
         let mut cache = self.cache.lock();
         let ImageCache { topics, blocks, .. } = &mut *cache;
         let stamp_ns = |index: usize| {
-            let position = topics[number].get(self.log.index(), self.log.file(), index)?;
+            let position = topics[number].get(&self.log.index(), self.log.file(), index)?;
             let (block, message) = self.log.message(blocks, position)?;
             let stamp_ns = stamp_ns(camera.kind, block.bytes(&message.data)).ok()?;
             let stamp_ns = camera.clock.stamp_ns(stamp_ns, position.log_time_ns);
@@ -135,7 +135,7 @@ impl ImageReader {
         let number = self.number_of(camera_key)?;
         let camera = &self.cameras[number];
         let mut cache = self.cache.lock();
-        let position = cache.topics[number].get(self.log.index(), self.log.file(), index);
+        let position = cache.topics[number].get(&self.log.index(), self.log.file(), index);
         let position = position.ok_or_else(|| LogError::NoSuchImage {
             topic: camera.topic.clone(),
             index,
@@ -225,7 +225,7 @@ impl ImageCache {
         kind: MessageKind,
         number: usize,
     ) -> Result<GrayImage, String> {
-        let position = self.topics[camera].get(log.index(), log.file(), number);
+        let position = self.topics[camera].get(&log.index(), log.file(), number);
         let message = position.and_then(|position| log.message(&mut self.blocks, position));
         let stream = &mut self.streams[camera];
         let Some((block, message)) = message else {

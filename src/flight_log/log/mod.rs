@@ -1,12 +1,16 @@
+mod followed;
+pub(crate) mod following;
 pub(crate) mod foreign;
 pub(crate) mod topic_info;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicI64, Ordering};
 
-use parking_lot::Mutex;
+use parking_lot::{Mutex, RwLock};
 
+use self::following::Following;
 use self::topic_info::{TopicInfo, nothing_read};
 use super::container::file::LogFile;
 use super::container::{BlockCache, ContainerIndex, DecodedBlock, MessagePosition, MessageSpan, TopicIndex};
@@ -29,11 +33,13 @@ const START_BYTES: usize = 512;
 pub struct FlightLog {
     path: PathBuf,
     file: LogFile,
-    index: ContainerIndex,
+    index: RwLock<Arc<ContainerIndex>>,
+    /// Growth of a log that is being written.
+    following: Option<Following>,
     channel_ids: BTreeMap<String, Vec<u16>>,
     topics: Vec<TopicInfo>,
     epoch_ns: i64,
-    duration_ns: i64,
+    duration_ns: AtomicI64,
     warnings: Vec<LogWarning>,
     /// Conversions of 16-bit images by topic, as far as they are known.
     grey_levels: Mutex<BTreeMap<String, Arc<GreyLevels>>>,
@@ -54,19 +60,24 @@ impl FlightLog {
         let file = LogFile::open(path, limits)?;
         check_magic(&file, path)?;
         let index = ContainerIndex::read(&file);
+        Self::of(path, file, index, None)
+    }
+
+    fn of(path: &Path, file: LogFile, index: ContainerIndex, following: Option<Following>) -> Result<Self, LogError> {
         let mut channel_ids: BTreeMap<String, Vec<u16>> = BTreeMap::new();
         for (id, channel) in &index.channels {
             channel_ids.entry(channel.topic.clone()).or_default().push(*id);
         }
-        let warnings: Vec<LogWarning> = refuse_topics(&mut channel_ids, limits).into_iter().collect();
+        let warnings: Vec<LogWarning> = refuse_topics(&mut channel_ids, file.limits()).into_iter().collect();
         let mut log = Self {
             path: path.to_owned(),
             file,
-            index,
+            index: RwLock::new(Arc::new(index)),
+            following,
             channel_ids,
             topics: Vec::new(),
             epoch_ns: 0,
-            duration_ns: 0,
+            duration_ns: AtomicI64::new(0),
             warnings,
             grey_levels: Mutex::default(),
         };
@@ -112,7 +123,7 @@ impl FlightLog {
 
     /// Time from the log's start to the latest header stamp among the last messages of its topics, in nanoseconds.
     pub fn duration_ns(&self) -> i64 {
-        self.duration_ns
+        self.duration_ns.load(Ordering::Relaxed)
     }
 
     /// Problems found when opening the log. Every [`FrameStream`](super::FrameStream) reports them again at their time.
@@ -125,9 +136,10 @@ impl FlightLog {
     }
 
     /// Name and content of the first attachment whose name ends with `name_ends_with`.
-    pub fn attachment(&self, name_ends_with: &str) -> Option<(&str, Vec<u8>)> {
-        let place = self.index.attachments.iter().find(|place| place.name.ends_with(name_ends_with))?;
-        Some((&place.name, ContainerIndex::attachment(&self.file, place)?))
+    pub fn attachment(&self, name_ends_with: &str) -> Option<(String, Vec<u8>)> {
+        let index = self.index();
+        let place = index.attachments.iter().find(|place| place.name.ends_with(name_ends_with))?;
+        Some((place.name.clone(), ContainerIndex::attachment(&self.file, place)?))
     }
 
     /// Names of the topics with messages of one of these kinds.
@@ -180,7 +192,8 @@ impl FlightLog {
     /// # Errors
     /// If messages of PX4 lack a field by their definition in the log.
     pub(crate) fn attitude_layout(&self, field: &str, info: &TopicInfo) -> Result<AttitudeLayout, LogError> {
-        let channel = self.channel_ids.get(&info.topic).and_then(|ids| self.index.channels.get(ids.first()?));
+        let index = self.index();
+        let channel = self.channel_ids.get(&info.topic).and_then(|ids| index.channels.get(ids.first()?));
         let definition = channel.and_then(|channel| channel.definition.as_deref()).unwrap_or_default();
         let kind = info.kind.unwrap_or(MessageKind::QuaternionStamped);
         AttitudeLayout::of(kind, definition).map_err(|problem| {
@@ -196,7 +209,7 @@ impl FlightLog {
 
     /// Positions of the messages of a topic.
     pub(super) fn topic_index(&self, topic: &str) -> TopicIndex {
-        TopicIndex::new(&self.index, self.channel_ids.get(topic).map_or(&[], |ids| ids))
+        TopicIndex::new(&self.index(), self.channel_ids.get(topic).map_or(&[], |ids| ids))
     }
 
     /// Returns an error if another process has shortened the file since it was opened, so that data read from it are
@@ -209,8 +222,9 @@ impl FlightLog {
         &self.file
     }
 
-    pub(crate) fn index(&self) -> &ContainerIndex {
-        &self.index
+    /// Blocks, channels and messages so far.
+    pub(crate) fn index(&self) -> Arc<ContainerIndex> {
+        Arc::clone(&self.index.read())
     }
 
     /// Converts a log time to nanoseconds since the start of the log.
@@ -224,7 +238,7 @@ impl FlightLog {
         let mut cache = BlockCache::new(2);
         let mut topic = self.topic_index(topic);
         let mut number = 0;
-        while let Some(position) = topic.get(&self.index, &self.file, number) {
+        while let Some(position) = topic.get(&self.index(), &self.file, number) {
             number += 1;
             if let Some((block, message)) = self.message(&mut cache, position) {
                 let data = block.bytes(&message.data);
@@ -241,7 +255,7 @@ impl FlightLog {
         cache: &mut BlockCache,
         position: MessagePosition,
     ) -> Option<(Arc<DecodedBlock>, MessageSpan)> {
-        let block = cache.get(&self.file, &self.index.blocks, position.block)?;
+        let block = cache.get(&self.file, &self.index().blocks, position.block)?;
         let message = block.message_at(position.offset)?.clone();
         Some((block, message))
     }
@@ -264,14 +278,15 @@ impl FlightLog {
 
     fn find_topics_and_times(&mut self) -> Result<(), LogError> {
         let mut cache = BlockCache::new(4);
+        let index = self.index();
         // Per topic that is read: name, and stamps of the first and last message.
         let mut stamps: Vec<(MessageKind, String, i64, i64)> = Vec::new();
         let mut infos = Vec::new();
         for (topic, ids) in &self.channel_ids {
-            let mut positions = TopicIndex::new(&self.index, ids);
-            let [first_ones, last_ones] = positions.ends(&self.index, &self.file);
+            let mut positions = TopicIndex::new(&index, ids);
+            let [first_ones, last_ones] = positions.ends(&index, &self.file);
             let (Some(first), Some(last)) = (first_ones.first(), last_ones.last()) else { continue };
-            let channel = ids.first().and_then(|id| self.index.channels.get(id));
+            let channel = ids.first().and_then(|id| index.channels.get(id));
             let Some(channel) = channel else { continue };
             let kind = MessageKind::of_channel(&channel.schema_name, &channel.encoding);
             if let Some(kind) = kind.filter(|kind| !kind.is_attitude()) {
@@ -287,16 +302,16 @@ impl FlightLog {
             }
             // The statistics may be wrong, too.
             let most = self.file.limits().messages(self.file.len() as u64);
-            let counted = self.index.statistics.as_ref().map(|counts| {
+            let counted = index.statistics.as_ref().map(|counts| {
                 let counts = ids.iter().filter_map(|id| counts.get(id));
                 counts.fold(0_u64, |sum, count| sum.saturating_add(*count)).min(most)
             });
-            let count = counted.unwrap_or_else(|| positions.count(&self.index, &self.file) as u64);
+            let count = counted.unwrap_or_else(|| positions.count(&index, &self.file) as u64);
             let names = [topic, &channel.schema_name, &channel.encoding].map(Clone::clone);
             infos.push((names, kind, count, *first, *last));
         }
         if infos.is_empty() {
-            let problem = match self.index.damages.first() {
+            let problem = match index.damages.first() {
                 Some(damage) => format!("at byte {}: {}", damage.byte, damage.problem),
                 None => "it has no messages; record again, or try `mcap doctor`".into(),
             };
@@ -321,7 +336,8 @@ impl FlightLog {
         let counted = || stamps.iter().filter(|entry| entry.2 >= earliest_ns && entry.2 > 0);
         let log_start_ns = i64::try_from(first_log_time_ns).unwrap_or(0);
         self.epoch_ns = counted().map(|entry| entry.2).min().unwrap_or(log_start_ns);
-        self.duration_ns = counted().map(|entry| relative_ns(entry.3, self.epoch_ns)).max().unwrap_or(0).max(0);
+        let duration_ns = counted().map(|entry| relative_ns(entry.3, self.epoch_ns)).max().unwrap_or(0).max(0);
+        self.duration_ns = AtomicI64::new(duration_ns);
         // Intrinsics are the same at any time.
         for (_, topic, first_ns, _) in stamps.iter().filter(|entry| entry.0 != MessageKind::CameraInfo) {
             if *first_ns == 0 {
@@ -340,7 +356,7 @@ impl FlightLog {
     }
 
     fn report_damage(&mut self) {
-        for damage in self.index.damages.clone() {
+        for damage in &self.index().damages {
             let stamp_ns =
                 if damage.after_log_time_ns == 0 { 0 } else { self.since_start(damage.after_log_time_ns).max(0) };
             let message = format!(

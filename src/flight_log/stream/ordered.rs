@@ -1,11 +1,12 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::super::FlightLog;
 use super::super::container::{MessagePosition, TopicIndex};
+use super::super::log::following::STOPPED_NS;
 use super::super::log::relative_ns;
 use super::super::messages::MessageKind;
 use super::super::video::keyframe_before;
+use super::super::{FlightLog, WarningKind};
 use super::read_context::{Drops, ReadContext, Refusal};
 use crate::geometry::seconds_from_ns;
 
@@ -51,9 +52,9 @@ impl<T> OrderedSamples<T> {
         let mut messages = log.topic_index(topic);
         let log_time_ns = u64::try_from(log.epoch_ns().saturating_add(from_ns)).unwrap_or(0);
         if !numbered {
-            messages.skip_to(log.index(), log_time_ns);
+            messages.skip_to(&log.index(), log_time_ns);
         }
-        let next = messages.first_at(log.index(), log.file(), log_time_ns);
+        let next = messages.first_at(&log.index(), log.file(), log_time_ns);
         let (pending, drops) = (BTreeMap::new(), Drops::new(topic));
         Self { messages, next, exhausted: false, decode, pending, released_ns: None, equal_stamps: false, drops }
     }
@@ -91,8 +92,8 @@ impl<T> OrderedSamples<T> {
     fn read_one(&mut self, context: &mut ReadContext) {
         let log = Arc::clone(&context.log);
         let number = self.next;
-        let Some(position) = self.messages.get(log.index(), log.file(), number) else {
-            self.exhausted = true;
+        let Some(position) = self.messages.get(&log.index(), log.file(), number) else {
+            self.exhausted = !log.wait_for_blocks(self.messages.known_blocks()) || self.has_stopped(context);
             return;
         };
         self.next += 1;
@@ -129,6 +130,24 @@ impl<T> OrderedSamples<T> {
             Err(refusal) if refusal.reason.is_empty() => {}
             Err(refusal) => self.drops.add(context, log_time_ns, refusal),
         }
+    }
+
+    /// True, with a warning, if the other topics of a log that is being written are far ahead of this one.
+    fn has_stopped(&self, context: &mut ReadContext) -> bool {
+        let newest_ns = context.log.index().last_log_time_ns();
+        let last_ns = self.messages.last_log_time_ns();
+        let stopped = last_ns.is_some_and(|last_ns| newest_ns > last_ns.saturating_add(STOPPED_NS));
+        if stopped && let Some(last_ns) = last_ns {
+            let stamp_ns = context.log.since_start(last_ns);
+            let topic = self.drops.topic().to_owned();
+            let message = format!(
+                "{topic}: no message for {:.0} s after second {:.3} while the others go on; the topic is taken as ended",
+                STOPPED_NS as f64 * 1e-9,
+                seconds_from_ns(stamp_ns)
+            );
+            context.warn(WarningKind::ReadingStopped, &topic, stamp_ns, message);
+        }
+        stopped
     }
 
     /// Reports the last dropped messages.

@@ -98,6 +98,10 @@ impl Drops {
         Self { topic: topic.to_owned(), run: None }
     }
 
+    pub(super) fn topic(&self) -> &str {
+        &self.topic
+    }
+
     /// Adds a message at a time since the start of the log.
     pub(super) fn add(&mut self, context: &mut ReadContext, time_ns: i64, refusal: Refusal) {
         if let Some(run) = self.run.as_mut().filter(|run| run.refusal.reason == refusal.reason) {

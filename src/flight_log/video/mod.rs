@@ -24,7 +24,7 @@ const BLOCKS: usize = 2;
 pub(super) fn keyframe_before(log: &FlightLog, messages: &mut TopicIndex, kind: MessageKind, number: usize) -> usize {
     let mut cache = BlockCache::new(BLOCKS);
     let mut holds = |number: usize, property: fn(&VideoPacket<'_>) -> bool| {
-        let Some(position) = messages.get(log.index(), log.file(), number) else { return false };
+        let Some(position) = messages.get(&log.index(), log.file(), number) else { return false };
         let Some((block, message)) = log.message(&mut cache, position) else { return false };
         read_video_packet(kind, block.bytes(&message.data)).is_ok_and(|packet| property(&packet))
     };

@@ -71,7 +71,7 @@ pub(crate) fn missing_frames(
     let mut missing: Vec<MissingFrames> = Vec::new();
     let mut read = 0;
     while read < most
-        && let Some(position) = messages.get(log.index(), log.file(), read)
+        && let Some(position) = messages.get(&log.index(), log.file(), read)
     {
         let number = read;
         read += 1;

@@ -40,7 +40,8 @@ pub fn write_excerpt(
     let once: BTreeSet<&str> =
         log.topics().iter().filter(|topic| topic.count <= SENT_ONCE).map(|topic| topic.topic.as_str()).collect();
     let (from_ns, to_ns) = (start_ns.saturating_sub(MARGIN_NS), end_ns.saturating_add(MARGIN_NS));
-    let mut blocks: Vec<_> = log.index().blocks.iter().collect();
+    let index = log.index();
+    let mut blocks: Vec<_> = index.blocks.iter().collect();
     blocks.sort_by_key(|block| (block.log_time_ns, block.bytes.start));
     // Log time minus stamp of the last message with a stamp.
     let mut delay_ns = 0;
@@ -49,7 +50,7 @@ pub fn write_excerpt(
         let mut messages: Vec<_> = decoded.messages.iter().collect();
         messages.sort_by_key(|message| message.log_time_ns);
         for message in messages {
-            let Some(channel) = log.index().channels.get(&message.channel_id) else { continue };
+            let Some(channel) = index.channels.get(&message.channel_id) else { continue };
             let data = decoded.bytes(&message.data);
             let logged_ns = log.since_start(message.log_time_ns);
             let stamped_ns = stamp_of(channel, data).map(|stamp_ns| stamp_ns.saturating_sub(log.epoch_ns()));

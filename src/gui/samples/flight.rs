@@ -124,6 +124,7 @@ fn recording_of(flight: &SyntheticFlight, runs: &[&str]) -> Recording {
         check: None,
         agreement: Arc::default(),
         is_being_checked: false,
+        is_being_written: false,
         warnings: vec![LogWarning::new(
             WarningKind::ImuGap,
             "/imu",

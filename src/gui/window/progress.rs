@@ -1,6 +1,7 @@
 //! Progress and remaining time of the estimation of all runs.
 
-use crate::session::Recording;
+use crate::geometry::seconds_from_ns;
+use crate::session::{Recording, RunRecord};
 
 /// Seconds of computation before a remaining time is shown.
 const MIN_MEASURED_S: f64 = 1.5;
@@ -20,6 +21,8 @@ pub struct Progress {
     pub fraction: f64,
     /// Remaining seconds at the present speed.
     pub left_s: Option<f64>,
+    /// Log time by which the last run is behind a log that is being written.
+    pub behind_s: Option<f64>,
 }
 
 impl ProgressMeter {
@@ -42,7 +45,12 @@ impl ProgressMeter {
             let (elapsed_s, done) = (now_s - begun_s, fraction - start_fraction);
             (elapsed_s >= MIN_MEASURED_S && done > 0.0).then(|| elapsed_s * (1.0 - fraction) / done)
         });
-        Some(Progress { runs: fractions.len(), fraction, left_s })
+        if recording.is_being_written {
+            let reached_ns = recording.runs.iter().filter(|run| !run.has_ended()).map(RunRecord::reached_ns).min();
+            let behind_s = reached_ns.map(|reached_ns| seconds_from_ns(recording.duration_ns - reached_ns).max(0.0));
+            return Some(Progress { runs: fractions.len(), fraction, left_s: None, behind_s });
+        }
+        Some(Progress { runs: fractions.len(), fraction, left_s, behind_s: None })
     }
 }
 
@@ -65,7 +73,7 @@ mod tests {
             recording.duration_ns = whole[0].steps[50].report.stamp_ns;
             meter.read(&recording, now_s).unwrap()
         };
-        assert_eq!(at(1, Some(10.0)), Progress { runs: 2, fraction: 0.0, left_s: None });
+        assert_eq!(at(1, Some(10.0)), Progress { runs: 2, fraction: 0.0, left_s: None, behind_s: None });
         let half = at(26, Some(20.0));
         assert!((half.fraction - 0.5).abs() < 1e-9 && (half.left_s.unwrap() - 10.0).abs() < 1e-6, "{half:?}");
         assert_eq!(at(11, Some(30.0)).left_s, None, "another run has come");

@@ -160,13 +160,21 @@ fn fields_ui(ui: &mut Ui, theme: &Theme, mut fields: Vec<Field>, room: f32) {
 
 fn progress_ui(ui: &mut Ui, progress: &Progress) {
     let left = progress.left_s.map_or_else(String::new, |left_s| format!(", {} s left", fixed(left_s.ceil(), 0)));
-    let text = format!("{}: {} %{left}", counted(progress.runs, "run"), fixed(100.0 * progress.fraction, 0));
+    let runs = counted(progress.runs, "run");
+    let text = match progress.behind_s {
+        Some(behind_s) => format!("{runs}: {} s behind", fixed(behind_s, 1)),
+        None => format!("{runs}: {} %{left}", fixed(100.0 * progress.fraction, 0)),
+    };
     let bar =
         ProgressBar::new(progress.fraction as f32).desired_width(PROGRESS_WIDTH).text(RichText::new(&text).small());
     let response = ui.add(bar);
     response
         .widget_info(|| egui::WidgetInfo::labeled(egui::Role::ProgressIndicator, true, format!("Computing {text}")));
-    response.on_hover_text("Estimation progress: processed log time of all runs, remaining wall-clock time");
+    response.on_hover_text(if progress.behind_s.is_some() {
+        "Another program is writing the log: log time from the last step to the newest message"
+    } else {
+        "Estimation progress: processed log time of all runs, remaining wall-clock time"
+    });
 }
 
 /// Shows that another log is being opened; returns true if that is cancelled.

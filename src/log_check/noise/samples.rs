@@ -32,10 +32,11 @@ impl ImuSeries {
         let clock = StampClock::of_rig(rig.is_some_and(|rig| rig.imu.use_log_time));
         let has_forces = has_forces(log, &force_topic);
         let mut series = Self { topic, ..Self::default() };
-        for block in &log.index().blocks {
+        let index = log.index();
+        for block in &index.blocks {
             let decoded = DecodedBlock::decode(log.file(), block);
             for message in &decoded.messages {
-                let Some(channel) = log.index().channels.get(&message.channel_id) else { continue };
+                let Some(channel) = index.channels.get(&message.channel_id) else { continue };
                 let (rate, force) = (channel.topic == series.topic, channel.topic == force_topic);
                 if !rate && !force {
                     continue;

@@ -129,10 +129,11 @@ impl Survey {
         }
         let mut counts: BTreeMap<String, u64> = BTreeMap::new();
         let mut keyframes_due: BTreeMap<String, u64> = BTreeMap::new();
-        for block in &log.index().blocks {
+        let index = log.index();
+        for block in &index.blocks {
             let decoded = DecodedBlock::decode(log.file(), block);
             // The damage of a scanned log was reported when it was opened.
-            let reported = !log.index().from_summary || block.bytes.end > log.file().len();
+            let reported = !index.from_summary || block.bytes.end > log.file().len();
             if let Some(damage) = decoded.damage.as_ref().filter(|_| !reported) {
                 let (first, last) = block.log_time_ns;
                 survey.damages.push(format!(
@@ -143,7 +144,7 @@ impl Survey {
                 ));
             }
             for message in &decoded.messages {
-                let Some(channel) = log.index().channels.get(&message.channel_id) else { continue };
+                let Some(channel) = index.channels.get(&message.channel_id) else { continue };
                 let Some(info) = log.topic(&channel.topic) else { continue };
                 let Some(kind) = info.kind else { continue };
                 let number = counts.entry(info.topic.clone()).or_default();

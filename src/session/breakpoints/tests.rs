@@ -212,6 +212,7 @@ fn recording_of(ranks: &[usize]) -> Recording {
         check: None,
         agreement: Arc::default(),
         is_being_checked: false,
+        is_being_written: false,
         warnings: Vec::new(),
         memory_budget_bytes: usize::MAX,
     }

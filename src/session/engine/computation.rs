@@ -76,6 +76,12 @@ impl Computation {
         (recording.check, recording.is_being_checked) = (Some(Arc::new(checked.findings)), false);
     }
 
+    /// Length of a log that another program is writing, or has completed.
+    pub(in crate::session) fn set_written(&mut self, duration_ns: i64, is_being_written: bool) {
+        let recording = self.recording_mut();
+        (recording.duration_ns, recording.is_being_written) = (duration_ns, is_being_written);
+    }
+
     /// The check of the log has been started beside the runs.
     pub(in crate::session) fn begin_check(&mut self) {
         self.recording_mut().is_being_checked = true;

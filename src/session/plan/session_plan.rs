@@ -49,6 +49,18 @@ pub struct SessionRequest {
     pub duration_s: Option<f64>,
     /// Limits on what is read of the log.
     pub limits: LogLimits,
+    /// For a log that another program is writing: the flag that ends reading it early, which is set from outside.
+    pub following: Option<StopFlag>,
+}
+
+/// A flag that ends the reading of a log that is being written; all are equal, because none changes a result.
+#[derive(Clone, Debug, Default)]
+pub struct StopFlag(pub Arc<AtomicBool>);
+
+impl PartialEq for StopFlag {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
 }
 
 /// A request with its log opened and a camera found for each run.
@@ -101,7 +113,10 @@ pub const DEFAULT_MEMORY_BUDGET_BYTES: usize = 1200 << 20;
 impl SessionPlan {
     /// Opens the log and its rigs and finds each run's camera.
     pub fn open(request: &SessionRequest) -> Result<Self, SessionError> {
-        let log = Arc::new(FlightLog::open_with(&request.log_path, &request.limits)?);
+        let log = Arc::new(match &request.following {
+            None => FlightLog::open_with(&request.log_path, &request.limits)?,
+            Some(StopFlag(stop)) => FlightLog::open_following(&request.log_path, &request.limits, Arc::clone(stop))?,
+        });
         check_start(&log, request.start_s)?;
         let mut rig = Rig::for_log(&log, request.rig_path.as_deref())?;
         if let Some(text) = &request.required_accuracy {

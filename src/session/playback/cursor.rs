@@ -277,6 +277,7 @@ mod tests {
                 check: None,
                 agreement: std::sync::Arc::default(),
                 is_being_checked: false,
+                is_being_written: false,
                 warnings: Vec::new(),
                 memory_budget_bytes: usize::MAX,
             }

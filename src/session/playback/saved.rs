@@ -159,6 +159,7 @@ impl SavedSession {
             start_s: self.start_s,
             duration_s: self.duration_s,
             limits: LogLimits::default(),
+            following: None,
         })
     }
 }

@@ -197,6 +197,7 @@ impl Session {
 
     /// Moves the cursor by `elapsed_s` seconds of the wall clock; see [`Cursor::advance`].
     pub fn advance(&mut self, elapsed_s: f64) {
+        self.note_growth();
         self.evaluate_breakpoints();
         self.resume();
         let recording = self.recording();
@@ -204,6 +205,19 @@ impl Session {
         self.cursor = cursor;
         self.notice(&recording, outcome);
         self.request_recomputation();
+    }
+
+    /// Stores the length of a log that another program is writing.
+    fn note_growth(&self) {
+        let log = &self.plan.log;
+        if !log.is_followed() {
+            return;
+        }
+        let written = (log.duration_ns(), log.end().is_none());
+        let recording = self.recording();
+        if written != (recording.duration_ns, recording.is_being_written) {
+            self.shared.change(|computation| computation.set_written(written.0, written.1));
+        }
     }
 
     pub fn apply(&mut self, command: Command) {

@@ -41,6 +41,8 @@ pub struct Recording {
     pub agreement: Arc<Agreement>,
     /// True while the log and its rig are being checked beside the runs.
     pub is_being_checked: bool,
+    /// True while another program is writing the log.
+    pub is_being_written: bool,
     /// Warnings about the log so far, in time order.
     pub warnings: Vec<LogWarning>,
     pub memory_budget_bytes: usize,
@@ -106,6 +108,7 @@ impl Recording {
             check: None,
             agreement: Arc::default(),
             is_being_checked: false,
+            is_being_written: false,
             warnings: Vec::new(),
             memory_budget_bytes: plan.memory_budget_bytes,
         };
@@ -114,6 +117,15 @@ impl Recording {
         recording.add_warnings(plan.log.warnings().iter().filter(|warning| !replaced(warning)).cloned().collect());
         recording.add_warnings(plan.warnings.clone());
         recording
+    }
+
+    /// This recording of a log that was being written, with what only the complete log tells: its length, ground truth
+    /// and trajectories.
+    #[must_use]
+    pub fn of_complete_log(self, plan: &SessionPlan) -> Self {
+        let mut complete = Self { runs: self.runs, ..Self::new(plan) };
+        complete.add_warnings(self.warnings);
+        complete
     }
 
     /// Name of the reference of the trajectories.

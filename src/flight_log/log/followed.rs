@@ -1,0 +1,185 @@
+//! A log that another program is writing: its index grows while it is read.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+
+use parking_lot::Mutex;
+
+use super::following::{BEGIN_NS, Following, Growth, IDLE_POLLS, LogEnd, POLL};
+use super::{FlightLog, check_magic};
+use crate::files::LogLimits;
+use crate::flight_log::container::ContainerIndex;
+use crate::flight_log::container::file::LogFile;
+use crate::flight_log::{LogError, LogWarning, WarningKind};
+use crate::geometry::seconds_from_ns;
+
+impl FlightLog {
+    /// Opens a log that another program is writing, as soon as it contains three seconds; its streams then wait for
+    /// messages until the log has its footer, nothing is written for half a minute, or `stop` is set.
+    ///
+    /// Topics, start and warnings follow from the messages at opening.
+    ///
+    /// # Errors
+    /// As [`FlightLog::open`], and if the file does not appear within half a minute.
+    pub fn open_following(path: &Path, limits: &LogLimits, stop: Arc<AtomicBool>) -> Result<Self, LogError> {
+        Self::follow(path, limits, stop, IDLE_POLLS)
+    }
+
+    fn follow(path: &Path, limits: &LogLimits, stop: Arc<AtomicBool>, idle_polls: u32) -> Result<Self, LogError> {
+        let mut polls = 0;
+        let file = loop {
+            polls += 1;
+            let waits = polls < idle_polls && !stop.load(Ordering::Relaxed);
+            match path.metadata() {
+                Ok(metadata) if metadata.len() == 0 && waits => {}
+                Err(_) if waits => {}
+                _ => break LogFile::open(path, limits)?,
+            }
+            thread::sleep(POLL);
+        };
+        check_magic(&file, path)?;
+        let (mut index, mut growth) = (ContainerIndex::default(), Growth::new(idle_polls));
+        while growth.end.is_none() && index.span_ns() < BEGIN_NS {
+            if !growth.grow(&file, &mut index, &stop) {
+                thread::sleep(POLL);
+            }
+        }
+        Self::of(path, file, index, Some(Following { growth: Mutex::new(growth), stop }))
+    }
+
+    /// Waits until the log has more blocks than this; false if it has ended.
+    pub(crate) fn wait_for_blocks(&self, known: usize) -> bool {
+        let Some(following) = &self.following else { return false };
+        while self.index().blocks.len() <= known {
+            let mut growth = following.growth.lock();
+            if growth.end.is_some() {
+                return self.index().blocks.len() > known;
+            }
+            let mut index = ContainerIndex::clone(&self.index());
+            if growth.grow(&self.file, &mut index, &following.stop) {
+                self.duration_ns.fetch_max(self.since_start(index.last_log_time_ns()), Ordering::Relaxed);
+                *self.index.write() = Arc::new(index);
+            } else {
+                // Readers look one after the other, so that their number does not shorten the time without growth.
+                thread::sleep(POLL);
+            }
+        }
+        true
+    }
+
+    /// True for a log that was opened while another program was writing it.
+    pub fn is_followed(&self) -> bool {
+        self.following.is_some()
+    }
+
+    /// Reason why a log that was being written has ended; `None` while it grows, and for any other log.
+    pub fn end(&self) -> Option<LogEnd> {
+        self.following.as_ref()?.growth.lock().end
+    }
+
+    /// Warning about a log whose writer has not completed it, `None` for any other log.
+    pub fn end_warning(&self) -> Option<LogWarning> {
+        let after_s = seconds_from_ns(self.duration_ns());
+        let problem = match self.end()? {
+            LogEnd::Complete => return None,
+            LogEnd::Idle => "nothing was written for 30 s, and the log has no footer: its writer has stopped",
+            LogEnd::Stopped => "reading was ended before the log was complete",
+            LogEnd::Limit => "a limit on the content of a log is reached (--limit)",
+        };
+        let message = format!("the log ends after second {after_s:.3}: {problem}; everything before it is used");
+        Some(LogWarning::new(WarningKind::Damage, "", self.duration_ns(), message))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs::{self, File};
+    use std::io::Write as _;
+    use std::time::Duration;
+
+    use super::*;
+    use crate::flight_log::MessageKind;
+
+    const IMPATIENT: u32 = 10;
+
+    fn sample() -> Vec<u8> {
+        fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/sample_logs/garden.mcap")).unwrap()
+    }
+
+    /// Log times of the messages of the IMU, waiting for those that are not written yet.
+    fn log_times(log: &FlightLog) -> Vec<u64> {
+        let topic = log.topics_of(&[MessageKind::Imu]).remove(0);
+        let mut messages = log.topic_index(&topic);
+        let mut times = Vec::new();
+        loop {
+            match messages.get(&log.index(), log.file(), times.len()) {
+                Some(position) => times.push(position.log_time_ns),
+                None if log.wait_for_blocks(messages.known_blocks()) => {}
+                None => return times,
+            }
+        }
+    }
+
+    /// Writes the bytes in parts that end anywhere, and returns the times that a reader gets meanwhile.
+    fn followed(path: &Path, bytes: &[u8]) -> (FlightLog, Vec<u64>) {
+        thread::scope(|scope| {
+            scope.spawn(|| {
+                let mut file = File::create(path).unwrap();
+                for part in bytes.chunks(70_001) {
+                    file.write_all(part).unwrap();
+                    thread::sleep(Duration::from_millis(2));
+                }
+            });
+            let log = FlightLog::follow(path, &LogLimits::default(), Arc::default(), IMPATIENT).unwrap();
+            let times = log_times(&log);
+            (log, times)
+        })
+    }
+
+    #[test]
+    fn a_log_that_is_being_written_gives_the_messages_of_the_complete_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("live.mcap");
+        let (log, times) = followed(&path, &sample());
+        assert_eq!((log.end(), log.end_warning()), (Some(LogEnd::Complete), None));
+        let complete = FlightLog::open(&path).unwrap();
+        assert_eq!(times, log_times(&complete));
+        assert_eq!(log.epoch_ns(), complete.epoch_ns());
+        assert!((log.duration_ns() - complete.duration_ns()).abs() < 50_000_000, "{}", log.duration_ns());
+        assert_eq!(complete.end(), None);
+    }
+
+    #[test]
+    fn a_writer_that_stops_ends_the_log_with_a_warning() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut cut = sample();
+        cut.truncate(cut.len() * 2 / 3);
+        let (log, times) = followed(&folder.path().join("live.mcap"), &cut);
+        assert_eq!(log.end(), Some(LogEnd::Idle));
+        assert!(log.end_warning().unwrap().message.contains("its writer has stopped"));
+        assert!(times.len() > 500, "{} messages", times.len());
+    }
+
+    #[test]
+    fn reading_ends_when_it_is_asked_to() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("live.mcap");
+        let bytes = sample();
+        fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+        let stop = Arc::new(AtomicBool::new(false));
+        let log = FlightLog::follow(&path, &LogLimits::default(), Arc::clone(&stop), IDLE_POLLS).unwrap();
+        thread::scope(|scope| {
+            scope.spawn(|| {
+                thread::sleep(Duration::from_millis(100));
+                stop.store(true, Ordering::Relaxed);
+            });
+            assert!(!log_times(&log).is_empty());
+        });
+        assert_eq!(log.end(), Some(LogEnd::Stopped));
+        let missing = folder.path().join("none.mcap");
+        let error = FlightLog::follow(&missing, &LogLimits::default(), Arc::default(), IMPATIENT).unwrap_err();
+        assert!(error.to_string().contains("none.mcap"), "{error}");
+    }
+}
