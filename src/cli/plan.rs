@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
-use dcvins::export::{self, PlanReport, PlannedFlight};
+use dcvins::export::{self, MissionStart, PlanReport, PlannedFlight};
 use dcvins::gimbal::ParameterId;
 use dcvins::observability::laboratory::{
     EnteredLimits, MotionPlanError, PLAN_DURATION_S, PLAN_SECONDS, PlanCriterion, PlanOptions, SCENE_M, Situation,
@@ -27,7 +27,7 @@ pub(crate) struct PlanArguments {
     /// The rig; its prior is the uncertainty before the motion.
     #[arg(value_name = "RIG")]
     pub rig: PathBuf,
-    /// Folder for plan.json, plan.txt, sigma.csv, motion.csv and listed.csv.
+    /// Folder for plan.json, plan.txt, tables of σ and of the motion, and a trajectory of the joints for ROS 2.
     #[arg(short = 'o', long, visible_alias = "output", value_name = "DIR")]
     pub out: PathBuf,
     /// The run that will estimate the calibration, as for `dcvins run`: NAME[:key=value,…].
@@ -81,6 +81,10 @@ pub(crate) struct PlanArguments {
     /// Seed of the random numbers of the search.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
+    /// Also write the motion as missions of ArduPilot and PX4 that begin here: latitude and longitude in degrees, height above
+    /// home in metres [default: 10], heading in degrees from north [default: 0].
+    #[arg(long, value_name = "LAT,LON,HEIGHT,HEADING", allow_hyphen_values = true)]
+    pub home: Option<MissionStart>,
     /// Overwrite any existing files. Without it, only a plan for a rig of the same name is replaced.
     #[arg(long)]
     pub force: bool,
@@ -183,7 +187,9 @@ pub(crate) fn plan(arguments: &PlanArguments) -> Result<ExitOutcome> {
         plan,
     };
     let joint_names: Vec<String> = situation.joints.iter().map(|joint| joint.name.clone()).collect();
-    let written = export::write_plan(&report, &joint_names, &arguments.out)?;
+    let chain = situation.chain.to_classical();
+    let mission = arguments.home.map(|start| (&chain, start));
+    let written = export::write_plan(&report, &joint_names, mission, &arguments.out)?;
     print_report(&report, arguments.json)?;
     for path in written {
         notify(&path.display().to_string());

@@ -14,6 +14,7 @@ pub(crate) mod folder_files;
 mod history_folders;
 mod history_report;
 pub(crate) mod masks;
+mod mission;
 mod motion_csv;
 mod noise_files;
 mod plan_files;
@@ -55,6 +56,7 @@ pub use history_report::{
     HistoryChange, HistoryFlight, HistoryInterval, HistoryParameter, HistoryReport, calibration_history, write_history,
 };
 pub use masks::write_masks;
+pub use mission::MissionStart;
 pub use motion_csv::{read_motion, write_motion};
 pub use noise_files::{write_allan, write_flight_noise};
 pub use plan_files::{PlanReport, PlannedFlight, check_plan_folder, write_plan};

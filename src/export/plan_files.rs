@@ -1,4 +1,5 @@
-//! Files of a planned motion: `plan.json`, `plan.txt`, `sigma.csv`, `motion.csv` and, for a searched motion, `listed.csv`.
+//! Files of a planned motion: `plan.json`, `plan.txt`, `sigma.csv`, `motion.csv`, `joint_trajectory.yaml`, for a searched
+//! motion `listed.csv`, and with a place missions of autopilots.
 
 use std::fmt::{self, Display, Formatter};
 use std::path::{Path, PathBuf};
@@ -8,8 +9,10 @@ use serde::Serialize;
 use super::error::ExportError;
 use super::existing::read_index;
 use super::folder_files::{json_text, remove_others, write_files};
+use super::mission::{Mission, MissionStart, joint_trajectory};
 use super::motion_csv::motion_csv;
 use crate::files::output;
+use crate::gimbal::ClassicalChain;
 use crate::observability::laboratory::{HandPlan, MotionPlan, PlanTable, PlannedParameter, SigmaRow};
 use crate::simulation::MotionSplines;
 use crate::table::{Column, csv};
@@ -21,7 +24,11 @@ const SIGMAS: &str = "sigma.csv";
 const MOTION: &str = "motion.csv";
 /// Best listed motion, repeated.
 const LISTED: &str = "listed.csv";
-const PLAN_FILES: [&str; 5] = [INDEX, TEXT, SIGMAS, MOTION, LISTED];
+const JOINT_TRAJECTORY: &str = "joint_trajectory.yaml";
+/// Missions of ArduPilot and PX4, and what they do not express.
+const MISSION_FILES: [&str; 3] = ["mission.waypoints", "mission.plan", "mission.txt"];
+const PLAN_FILES: [&str; 9] =
+    [INDEX, TEXT, SIGMAS, MOTION, JOINT_TRAJECTORY, LISTED, MISSION_FILES[0], MISSION_FILES[1], MISSION_FILES[2]];
 /// Key of the index whose value names the rig.
 const RIG_KEY: &str = "rig";
 
@@ -111,21 +118,33 @@ pub fn check_plan_folder(folder: &Path, rig: &str, force: bool) -> Result<(), Ex
     Err(ExportError::Existing { problem, path: folder.to_owned() })
 }
 
-/// Writes the files of a plan and returns their paths; the listed motion of an earlier plan is removed if this one has
-/// none.
+/// Writes the files of a plan and returns their paths; the listed motion and the missions of an earlier plan are removed if
+/// this one has none. Missions begin at a place with a chain of the gimbal.
 ///
 /// # Errors
 /// If the folder or a file cannot be written.
-pub fn write_plan(report: &PlanReport, joint_names: &[String], folder: &Path) -> Result<Vec<PathBuf>, ExportError> {
+pub fn write_plan(
+    report: &PlanReport,
+    joint_names: &[String],
+    mission: Option<(&ClassicalChain, MissionStart)>,
+    folder: &Path,
+) -> Result<Vec<PathBuf>, ExportError> {
     let json = json_text(report, &folder.join(INDEX))?;
     let mut files =
         vec![(INDEX, json), (TEXT, report.to_string()), (SIGMAS, sigma_csv(report.plan.table(), report.plan.sigmas()))];
-    files.push((MOTION, motion_csv(report.plan.motion(), joint_names)));
+    let motion = report.plan.motion();
+    files.push((MOTION, motion_csv(motion, joint_names)));
+    files.push((JOINT_TRAJECTORY, joint_trajectory(motion, joint_names)));
+    if let Some((chain, start)) = mission {
+        let mission = Mission::new(motion, chain, start);
+        let plan = json_text(&mission.plan(), &folder.join(MISSION_FILES[1]))?;
+        files.extend(MISSION_FILES.into_iter().zip([mission.waypoints(), plan, mission.to_string()]));
+    }
     if let PlannedFlight::Motion(plan) = &report.plan {
         files.extend(plan.listed.as_ref().map(|listed| (LISTED, motion_csv(&listed.motion, joint_names))));
     }
     let paths = write_files(files, folder)?;
-    remove_others(&[LISTED], &paths, folder)?;
+    remove_others(&[&MISSION_FILES[..], &[LISTED]].concat(), &paths, folder)?;
     Ok(paths)
 }
 

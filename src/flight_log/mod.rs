@@ -34,6 +34,7 @@ pub use self::stream::{
     FrameStream, RecordedImage, SensorFrame, SensorSamples, ground_truth_poses, imu_samples, joint_samples,
     nominal_joint_sigma_rad, recorded_images,
 };
+pub(crate) use self::trajectory::geodesy::Geodetic;
 pub use self::trajectory::{BATCH_REFERENCE, RecordedPose, is_batch_reference, read_trajectory_file};
 pub use self::warning::{LogWarning, Magnitude, WarningKind};
 pub use self::writer::excerpt::{ExcerptReport, write_excerpt};

@@ -52,9 +52,10 @@ fn a_plan_has_the_same_bytes_on_any_number_of_threads_and_replaces_its_own() {
     let printed = plan(folder.path(), &[&[garden.as_str(), "-o", "b"], &SMALL[..]].concat(), "3", 0, &[]).stdout;
     let (a, b) = (files(&folder.path().join("a")), files(&folder.path().join("b")));
     let names: Vec<&str> = a.iter().map(|(name, _)| name.as_str()).collect();
-    assert_eq!(names, ["listed.csv", "motion.csv", "plan.json", "plan.txt", "sigma.csv"]);
+    let expected = ["joint_trajectory.yaml", "listed.csv", "motion.csv", "plan.json", "plan.txt", "sigma.csv"];
+    assert_eq!(names, expected);
     assert!(a == b, "the files differ");
-    assert_eq!(printed, a[3].1, "the text is printed");
+    assert_eq!(printed, a[4].1, "the text is printed");
 
     let plan_json = index(&folder.path().join("a"));
     assert_eq!((plan_json["rig"].as_str(), plan_json["kind"].as_str()), (Some("garden"), Some("motion")));
@@ -62,16 +63,23 @@ fn a_plan_has_the_same_bytes_on_any_number_of_threads_and_replaces_its_own() {
     for limit in plan_json["limits"].as_array().expect("a list") {
         assert!(limit["reached"].as_f64() <= limit["limit"].as_f64().map(|limit| limit + 1e-9), "{limit}");
     }
-    let motion = String::from_utf8(a[1].1.clone()).expect("text");
+    let motion = String::from_utf8(a[2].1.clone()).expect("text");
     assert!(motion.starts_with("t_s,yaw_rad,roll_rad,pitch_rad,x_m,y_m,z_m,heading_rad\n0,"), "{motion}");
     assert_eq!(motion.lines().count(), 162);
-    let sigmas = String::from_utf8(a[4].1.clone()).expect("text");
+    let sigmas = String::from_utf8(a[5].1.clone()).expect("text");
     assert_eq!(sigmas.lines().count(), 1 + 9 * 18, "nine times, 18 parameters");
 
     let by_hand = [&[garden.as_str(), "-o", "a", "--by-hand"], &SMALL[..2]].concat();
     plan(folder.path(), &by_hand, "2", 0, &["plan.txt"]);
     let names: Vec<String> = files(&folder.path().join("a")).into_iter().map(|(name, _)| name).collect();
-    assert_eq!(names, ["motion.csv", "plan.json", "plan.txt", "sigma.csv"], "moves by hand are compared with nothing");
+    let expected = ["joint_trajectory.yaml", "motion.csv", "plan.json", "plan.txt", "sigma.csv"];
+    assert_eq!(names, expected, "moves by hand are compared with nothing");
+    let place = [&by_hand[..], &["--home", "-33.9,151.2,12,90"]].concat();
+    plan(folder.path(), &place, "2", 0, &["mission.waypoints", "mission.plan", "mission.txt"]);
+    let mission = fs::read_to_string(folder.path().join("a/mission.waypoints")).expect("a mission");
+    assert!(mission.starts_with("QGC WPL 110\n") && mission.contains("\t1000\t"), "{mission}");
+    plan(folder.path(), &by_hand, "2", 0, &[]);
+    assert!(!folder.path().join("a/mission.plan").exists(), "the mission of the earlier plan is removed");
     let steps = index(&folder.path().join("a"))["steps"].as_array().map(Vec::len);
     assert_eq!(steps, Some(2));
     let other = [&[pan_tilt.as_str(), "-o", "a"], &SMALL[..]].concat();
@@ -136,6 +144,7 @@ fn wrong_requests_say_what_is_possible() {
     check(&["--parameters", "pitch.q"], 1, &["--parameters names 'pitch.q'", "pitch.beta"]);
     check(&["--run", "auto:calibrate=off"], 1, &["auto-calibrate-off", "does not estimate the calibration"]);
     check(&["--run", "auto:timeshift=on"], 1, &["the chain only"]);
+    check(&["--home", "95,8"], 2, &["expected LAT,LON"]);
     check(&["--duration", "3"], 2, &["expected seconds from 8 to 120"]);
     check(&["--box", "1,2"], 2, &["three lengths"]);
     check(&["--distance", "9,4"], 2, &["nearest and the farthest"]);

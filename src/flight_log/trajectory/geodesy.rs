@@ -27,6 +27,22 @@ impl Geodetic {
         })
     }
 
+    /// Position this far to the east and to the north at the same altitude, at most some kilometres away.
+    pub(crate) fn moved(self, east_m: f64, north_m: f64) -> Self {
+        let mut moved = self;
+        // Each round corrects the rest in the tangent plane by the radius of a sphere, which is wrong by less than 1 %.
+        for _ in 0..4 {
+            let rest = Vector3::new(east_m, north_m, 0.0) - moved.east_north_up_m(self);
+            moved.latitude_rad += rest.y / SEMI_MAJOR_AXIS_M;
+            moved.longitude_rad += rest.x / (SEMI_MAJOR_AXIS_M * self.latitude_rad.cos().max(1e-6));
+        }
+        moved
+    }
+
+    pub(crate) fn latitude_longitude_deg(self) -> [f64; 2] {
+        [self.latitude_rad, self.longitude_rad].map(f64::to_degrees)
+    }
+
     /// Earth-centred, earth-fixed position, in metres.
     fn in_earth_m(self) -> Vector3<f64> {
         let (sin_latitude, cos_latitude) = self.latitude_rad.sin_cos();
@@ -60,6 +76,15 @@ impl Geodetic {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_moved_position_lies_where_it_was_moved_to() {
+        for (latitude_deg, longitude_deg) in [(47.4, 8.5), (-33.9, 151.2), (0.1, -179.9), (69.0, 18.0)] {
+            let origin = Geodetic::from_deg(latitude_deg, longitude_deg, 0.0).unwrap();
+            let moved = origin.moved(30.0, -12.5).east_north_up_m(origin);
+            assert!((moved.xy() - nalgebra::Vector2::new(30.0, -12.5)).norm() < 1e-6, "{moved}");
+        }
+    }
 
     #[test]
     fn places_are_mapped_to_the_tangent_plane() {
