@@ -58,6 +58,9 @@ pub(crate) struct ParameterHistory {
     pub(crate) verdicts: Vec<Determination>,
 }
 
+/// Log time after which the motion that is still needed is computed again while the log is being written.
+const LIVE_PERIOD_NS: i64 = 2_000_000_000;
+
 #[derive(Debug, Default)]
 struct FlightTable {
     follower: Follower,
@@ -102,7 +105,8 @@ impl FlightTables {
     }
 
     /// Motion that brings the parameters of a trusted run to the required accuracy, when the run has ended without reaching
-    /// it and the suggested motions of its table are known.
+    /// it and the suggested motions of its table are known. While the log is being written, the motion that was needed a few
+    /// seconds ago.
     pub(crate) fn motion(
         &self,
         ctx: &Context,
@@ -110,13 +114,22 @@ impl FlightTables {
         run: &RunRecord,
         answer: &Answer,
     ) -> Option<Arc<SufficientMotion>> {
-        if !run.has_ended() || !answer.needs_motion() || self.report(ctx, recording, run, answer).waits_for_advice {
+        let live = recording.is_being_written;
+        if !(live || run.has_ended()) || !answer.needs_motion() {
+            return None;
+        }
+        if self.report(ctx, recording, run, answer).waits_for_advice {
             return None;
         }
         let number = recording.runs.iter().position(|other| other.id == run.id).unwrap_or(0);
         let mut runs = self.runs.lock().unwrap_or_else(PoisonError::into_inner);
         let table = runs.get_mut(number)?;
         let step = table.verdicts.ranked_step()?;
+        let since_ns = table.motion.last().map(|(known, _)| step.report.stamp_ns - known.report.stamp_ns);
+        if live && (table.motion.is_busy() || since_ns.is_some_and(|since_ns| since_ns < LIVE_PERIOD_NS)) {
+            table.motion.receive();
+            return table.motion.last()?.1.cloned();
+        }
         table.motion.request(step, "motion", self.in_background, || {
             let (step, rig, camera) = (Arc::clone(step), Arc::clone(&recording.rig), run.camera_key.clone());
             move || step_motion(&step, &rig, &camera)
@@ -125,7 +138,7 @@ impl FlightTables {
             ctx.request_repaint_after(REPAINT);
         }
         let (known, motion) = table.motion.last()?;
-        motion.filter(|_| Arc::ptr_eq(known, step)).cloned()
+        motion.filter(|_| live || Arc::ptr_eq(known, step)).cloned()
     }
 }
 

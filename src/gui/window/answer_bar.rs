@@ -100,9 +100,13 @@ impl<'a> Subject<'a> {
 
 /// Sentence in place of an answer that is still going to change: the check may name a cause of what the run shows, and the
 /// number of accurate parameters grows with every step. Residuals that disagree are said as soon as the check has ended.
+/// While the log is being written, the pilot needs the numbers so far.
 fn pending(recording: &Recording, run: &RunRecord, answer: &Answer) -> Option<&'static str> {
     if recording.is_being_checked {
         return Some("… Checking the log beside the runs");
+    }
+    if recording.is_being_written && answer.requirement.is_some() {
+        return None;
     }
     let is_computing = !run.has_ended() && answer.trust == Trust::Trusted;
     is_computing.then_some("… Computing; so far nothing speaks against this run")
@@ -129,7 +133,6 @@ fn motion_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, motion: &SufficientMotion)
     }
 }
 
-/// Draws the buttons of the first finding, from right to left.
 /// Says that the chain of the run is shown moved, with a button that moves it back.
 fn moved_chain_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>) {
     if ctx.selection.slide.is_none_or(|slide| slide.amount == 0.0) {
@@ -142,6 +145,7 @@ fn moved_chain_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>) {
     }
 }
 
+/// Draws the buttons of the first finding, from right to left.
 fn buttons_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, answer: &Answer, actions: &mut Vec<Action>) {
     let Some(first) = answer.findings.first() else { return };
     let is_running = ctx.playback.diagnosis.is_some();
@@ -219,6 +223,21 @@ mod tests {
         };
         let all = [(false, false), (false, true), (true, false), (true, true)];
         assert_eq!(all.map(|(checked, finished)| sentence(checked, finished)), [Some(0), Some(0), Some(1), Some(2)]);
+    }
+
+    #[test]
+    fn in_flight_the_bar_says_how_accurate_the_calibration_is_and_the_motion_that_is_needed() {
+        let mut recording = sample();
+        recording.runs.truncate(1);
+        (recording.is_being_written, recording.runs[0].finished) = (true, false);
+        let harness = bench_of(recording.clone(), [1600.0, 900.0]);
+        assert!(harness.query_all_by_label_contains(", worst ").next().is_some());
+        assert!(harness.query_all_by_label_contains("Fly ").next().is_some());
+        assert!(harness.query_all_by_label_contains("s behind").next().is_some());
+        // Before the first window there is no calibration to speak of.
+        recording.runs[0].steps.clear();
+        let harness = bench_of(recording, [1600.0, 900.0]);
+        assert!(harness.query_all_by_label_contains("… Computing").next().is_some());
     }
 
     #[test]
