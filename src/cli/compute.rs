@@ -52,6 +52,7 @@ pub(crate) fn compute_following(plan: &SessionPlan, delay: &mut Delay) -> Result
     let mut reached_s = 0.0;
     let computation = session::compute(plan, &mut |recording| {
         let (_, now_s) = progress_of(recording);
+        plan.log.look_for_growth();
         let log_s = seconds_from_ns(plan.log.duration_ns());
         if now_s > reached_s {
             reached_s = now_s;

@@ -446,7 +446,12 @@ impl ContainerIndex {
 
     /// Largest log time, 0 without messages.
     pub(crate) fn last_log_time_ns(&self) -> u64 {
-        self.blocks.iter().map(|block| block.log_time_ns.1).max().unwrap_or(0)
+        self.last_log_time_ns_of(self.blocks.len())
+    }
+
+    /// Largest log time of the first blocks, 0 without messages.
+    pub(crate) fn last_log_time_ns_of(&self, blocks: usize) -> u64 {
+        self.blocks.iter().take(blocks).map(|block| block.log_time_ns.1).max().unwrap_or(0)
     }
 
     fn report(&mut self, byte: usize, problem: String) {

@@ -7,7 +7,7 @@ use std::thread;
 
 use parking_lot::Mutex;
 
-use super::following::{BEGIN_NS, Following, Growth, IDLE_POLLS, LogEnd, POLL};
+use super::following::{BEGIN_NS, Following, Growth, LogEnd, POLL, Patience};
 use super::{FlightLog, check_magic};
 use crate::files::LogLimits;
 use crate::flight_log::container::ContainerIndex;
@@ -24,14 +24,14 @@ impl FlightLog {
     /// # Errors
     /// As [`FlightLog::open`], and if the file does not appear within half a minute.
     pub fn open_following(path: &Path, limits: &LogLimits, stop: Arc<AtomicBool>) -> Result<Self, LogError> {
-        Self::follow(path, limits, stop, IDLE_POLLS)
+        Self::follow(path, limits, stop, Patience::default())
     }
 
-    fn follow(path: &Path, limits: &LogLimits, stop: Arc<AtomicBool>, idle_polls: u32) -> Result<Self, LogError> {
+    fn follow(path: &Path, limits: &LogLimits, stop: Arc<AtomicBool>, patience: Patience) -> Result<Self, LogError> {
         let mut polls = 0;
         let file = loop {
             polls += 1;
-            let waits = polls < idle_polls && !stop.load(Ordering::Relaxed);
+            let waits = polls < patience.idle_polls && !stop.load(Ordering::Relaxed);
             match path.metadata() {
                 Ok(metadata) if metadata.len() == 0 && waits => {}
                 Err(_) if waits => {}
@@ -40,9 +40,10 @@ impl FlightLog {
             thread::sleep(POLL);
         };
         check_magic(&file, path)?;
-        let (mut index, mut growth) = (ContainerIndex::default(), Growth::new(idle_polls));
+        let (mut index, mut growth) = (ContainerIndex::default(), Growth::new(patience));
         while growth.end.is_none() && index.span_ns() < BEGIN_NS {
             if !growth.grow(&file, &mut index, &stop) {
+                growth.polls += 1;
                 thread::sleep(POLL);
             }
         }
@@ -57,16 +58,37 @@ impl FlightLog {
             if growth.end.is_some() {
                 return self.index().blocks.len() > known;
             }
-            let mut index = ContainerIndex::clone(&self.index());
-            if growth.grow(&self.file, &mut index, &following.stop) {
-                self.duration_ns.fetch_max(self.since_start(index.last_log_time_ns()), Ordering::Relaxed);
-                *self.index.write() = Arc::new(index);
-            } else {
+            if !self.look(&mut growth, &following.stop) {
+                growth.polls += 1;
                 // Readers look one after the other, so that their number does not shorten the time without growth.
                 thread::sleep(POLL);
             }
         }
         true
+    }
+
+    /// Adds to the index what has been written since; true if there are more blocks.
+    fn look(&self, growth: &mut Growth, stop: &AtomicBool) -> bool {
+        let mut index = ContainerIndex::clone(&self.index());
+        let has_grown = growth.grow(&self.file, &mut index, stop);
+        if has_grown {
+            self.duration_ns.fetch_max(self.since_start(index.last_log_time_ns()), Ordering::Relaxed);
+            *self.index.write() = Arc::new(index);
+        }
+        has_grown
+    }
+
+    /// Looks at a log that is being written while no stream waits for it, so that its length is the present one.
+    pub fn look_for_growth(&self) {
+        let Some(following) = &self.following else { return };
+        if let Some(mut growth) = following.growth.try_lock().filter(|growth| growth.end.is_none()) {
+            self.look(&mut growth, &following.stop);
+        }
+    }
+
+    /// Log time by which other topics are ahead of a topic that has ended; `None` for a log that is complete.
+    pub(crate) fn stopped_ns(&self) -> Option<u64> {
+        Some(self.following.as_ref()?.growth.lock().patience.stopped_ns)
     }
 
     /// True for a log that was opened while another program was writing it.
@@ -102,7 +124,7 @@ mod tests {
     use super::*;
     use crate::flight_log::MessageKind;
 
-    const IMPATIENT: u32 = 10;
+    const IMPATIENT: Patience = Patience { idle_polls: 10, stopped_ns: 2_000_000_000 };
 
     fn sample() -> Vec<u8> {
         fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/sample_logs/garden.mcap")).unwrap()
@@ -163,13 +185,36 @@ mod tests {
     }
 
     #[test]
+    fn a_reader_that_is_far_behind_loses_no_topic() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("live.mcap");
+        let bytes = sample();
+        // The first half has more than three seconds; five seconds follow at once, which is longer than the patience.
+        let (first, rest) = bytes.split_at(bytes.len() / 2);
+        fs::write(&path, first).unwrap();
+        let follow = || FlightLog::follow(&path, &LogLimits::default(), Arc::default(), IMPATIENT);
+        let log = Arc::new(follow().unwrap());
+        let yaml = include_str!("../../../sample_logs/garden.rig.yaml");
+        let rig = crate::sensors::Rig::from_yaml(yaml, Path::new("garden.rig.yaml")).unwrap();
+        let count = |log: &Arc<FlightLog>| crate::flight_log::imu_samples(log, &rig).unwrap().count();
+        let followed = thread::scope(|scope| {
+            let reader = scope.spawn(|| count(&log));
+            thread::sleep(POLL);
+            fs::OpenOptions::new().append(true).open(&path).unwrap().write_all(rest).unwrap();
+            reader.join().unwrap()
+        });
+        assert_eq!(followed, count(&Arc::new(FlightLog::open(&path).unwrap())));
+        assert_eq!(log.end(), Some(LogEnd::Complete));
+    }
+
+    #[test]
     fn reading_ends_when_it_is_asked_to() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("live.mcap");
         let bytes = sample();
         fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
         let stop = Arc::new(AtomicBool::new(false));
-        let log = FlightLog::follow(&path, &LogLimits::default(), Arc::clone(&stop), IDLE_POLLS).unwrap();
+        let log = FlightLog::follow(&path, &LogLimits::default(), Arc::clone(&stop), Patience::default()).unwrap();
         thread::scope(|scope| {
             scope.spawn(|| {
                 thread::sleep(Duration::from_millis(100));

@@ -11,12 +11,23 @@ use crate::flight_log::container::{ContainerIndex, ScanEnd, ScanState};
 
 /// Time between two looks at a file that has not grown.
 pub(super) const POLL: Duration = Duration::from_millis(20);
-/// Number of looks without growth after which a log without a footer is taken as ended: half a minute.
-pub(super) const IDLE_POLLS: u32 = 1500;
 /// Span of the messages with which a log is opened: enough for the rates of its topics.
 pub(super) const BEGIN_NS: u64 = 3_000_000_000;
-/// Log time by which other topics are ahead of a topic that has ended.
-pub(crate) const STOPPED_NS: u64 = 10_000_000_000;
+/// How long a reader waits for messages that are not written.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Patience {
+    /// Number of looks without growth after which a log without a footer is taken as ended.
+    pub(super) idle_polls: u32,
+    /// Log time by which other topics are ahead of a topic that has ended.
+    pub(super) stopped_ns: u64,
+}
+
+impl Default for Patience {
+    /// Half a minute, and ten seconds.
+    fn default() -> Self {
+        Self { idle_polls: 1500, stopped_ns: 10_000_000_000 }
+    }
+}
 
 /// Growth of a log.
 #[derive(Debug)]
@@ -30,10 +41,9 @@ pub(super) struct Following {
 #[derive(Debug)]
 pub(super) struct Growth {
     scan: ScanState,
-    /// Number of looks since the file grew.
-    polls: u32,
-    /// Number of looks without growth after which the log is taken as ended.
-    idle_polls: u32,
+    /// Number of waits since the file grew.
+    pub(super) polls: u32,
+    pub(super) patience: Patience,
     pub(super) end: Option<LogEnd>,
 }
 
@@ -51,19 +61,23 @@ pub enum LogEnd {
 }
 
 impl Growth {
-    pub(super) fn new(idle_polls: u32) -> Self {
-        Self { scan: ScanState::default(), polls: 0, idle_polls, end: None }
+    pub(super) fn new(patience: Patience) -> Self {
+        Self { scan: ScanState::default(), polls: 0, patience, end: None }
     }
 
     /// Adds what has been written since; true if there are more blocks.
     pub(super) fn grow(&mut self, file: &LogFile, index: &mut ContainerIndex, stop: &AtomicBool) -> bool {
-        self.polls = if file.grow() { 0 } else { self.polls + 1 };
+        if file.grow() {
+            self.polls = 0;
+        }
         let before = index.blocks.len();
         self.end = match index.scan(file, &mut self.scan) {
             ScanEnd::Footer => Some(LogEnd::Complete),
             ScanEnd::Limit => Some(LogEnd::Limit),
             ScanEnd::EndOfFile | ScanEnd::Incomplete(_) if stop.load(Ordering::Relaxed) => Some(LogEnd::Stopped),
-            ScanEnd::EndOfFile | ScanEnd::Incomplete(_) => (self.polls > self.idle_polls).then_some(LogEnd::Idle),
+            ScanEnd::EndOfFile | ScanEnd::Incomplete(_) => {
+                (self.polls > self.patience.idle_polls).then_some(LogEnd::Idle)
+            }
         };
         index.blocks.len() > before
     }

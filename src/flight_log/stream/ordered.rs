@@ -2,7 +2,6 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::super::container::{MessagePosition, TopicIndex};
-use super::super::log::following::STOPPED_NS;
 use super::super::log::relative_ns;
 use super::super::messages::MessageKind;
 use super::super::video::keyframe_before;
@@ -93,7 +92,8 @@ impl<T> OrderedSamples<T> {
         let log = Arc::clone(&context.log);
         let number = self.next;
         let Some(position) = self.messages.get(&log.index(), log.file(), number) else {
-            self.exhausted = !log.wait_for_blocks(self.messages.known_blocks()) || self.has_stopped(context);
+            // All messages so far have been read.
+            self.exhausted = self.has_stopped(context) || !log.wait_for_blocks(self.messages.known_blocks());
             return;
         };
         self.next += 1;
@@ -134,15 +134,18 @@ impl<T> OrderedSamples<T> {
 
     /// True, with a warning, if the other topics of a log that is being written are far ahead of this one.
     fn has_stopped(&self, context: &mut ReadContext) -> bool {
-        let newest_ns = context.log.index().last_log_time_ns();
+        let Some(stopped_ns) = context.log.stopped_ns() else { return false };
+        let index = context.log.index();
+        // Blocks that the topic has not looked at yet may have messages of it.
+        let newest_ns = index.last_log_time_ns_of(self.messages.known_blocks());
         let last_ns = self.messages.last_log_time_ns();
-        let stopped = last_ns.is_some_and(|last_ns| newest_ns > last_ns.saturating_add(STOPPED_NS));
+        let stopped = last_ns.is_some_and(|last_ns| newest_ns > last_ns.saturating_add(stopped_ns));
         if stopped && let Some(last_ns) = last_ns {
             let stamp_ns = context.log.since_start(last_ns);
             let topic = self.drops.topic().to_owned();
             let message = format!(
                 "{topic}: no message for {:.0} s after second {:.3} while the others go on; the topic is taken as ended",
-                STOPPED_NS as f64 * 1e-9,
+                stopped_ns as f64 * 1e-9,
                 seconds_from_ns(stamp_ns)
             );
             context.warn(WarningKind::ReadingStopped, &topic, stamp_ns, message);

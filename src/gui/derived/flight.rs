@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use egui::Context;
 
 use super::follow::Follower;
-use super::step_advice::{step_advice, step_motion};
+use super::step_advice::{next_motion, step_advice, step_motion};
 use super::step_work::{REPAINT, StepWork};
 use crate::gimbal::ParameterId;
 use crate::gui::parameter_names::place_of;
@@ -71,6 +71,8 @@ struct FlightTable {
     history: Arc<DeterminationHistory>,
     advice: StepWork<Arc<Advice>>,
     motion: StepWork<Arc<SufficientMotion>>,
+    /// True if `motion` belongs to a flight that goes on.
+    live: bool,
     /// True if `report` contains the motions of the last step's advice.
     advised: bool,
     report: FlightReport,
@@ -124,6 +126,9 @@ impl FlightTables {
         let number = recording.runs.iter().position(|other| other.id == run.id).unwrap_or(0);
         let mut runs = self.runs.lock().unwrap_or_else(PoisonError::into_inner);
         let table = runs.get_mut(number)?;
+        if table.live != live {
+            (table.live, table.motion) = (live, StepWork::default());
+        }
         let step = table.verdicts.ranked_step()?;
         let since_ns = table.motion.last().map(|(known, _)| step.report.stamp_ns - known.report.stamp_ns);
         if live && (table.motion.is_busy() || since_ns.is_some_and(|since_ns| since_ns < LIVE_PERIOD_NS)) {
@@ -132,7 +137,7 @@ impl FlightTables {
         }
         table.motion.request(step, "motion", self.in_background, || {
             let (step, rig, camera) = (Arc::clone(step), Arc::clone(&recording.rig), run.camera_key.clone());
-            move || step_motion(&step, &rig, &camera)
+            move || if live { next_motion(&step, &rig, &camera) } else { step_motion(&step, &rig, &camera) }
         });
         if table.motion.is_busy() {
             ctx.request_repaint_after(REPAINT);

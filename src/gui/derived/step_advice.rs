@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
-use crate::observability::laboratory::{Advice, SufficientMotion};
+use crate::observability::laboratory::{Advice, LONGEST_MOTION_S, NEXT_MOTION_S, SufficientMotion};
 use crate::sensors::Rig;
 use crate::session::{StepRecord, flight_advice, motion_after};
 
@@ -66,7 +66,12 @@ pub(in crate::gui) fn step_motion(
     rig: &Arc<Rig>,
     camera_key: &str,
 ) -> Option<Arc<SufficientMotion>> {
-    MOTIONS.of(step, rig, camera_key, motion_after)
+    MOTIONS.of(step, rig, camera_key, |step, rig, camera_key| motion_after(step, rig, camera_key, LONGEST_MOTION_S))
+}
+
+/// The next moves after a step of a flight that goes on, towards the required accuracy; `None` if it is reached.
+pub(in crate::gui) fn next_motion(step: &StepRecord, rig: &Rig, camera_key: &str) -> Option<Arc<SufficientMotion>> {
+    motion_after(step, rig, camera_key, NEXT_MOTION_S).map(Arc::new)
 }
 
 #[cfg(test)]

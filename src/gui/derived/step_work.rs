@@ -17,7 +17,16 @@ pub(in crate::gui) const REPAINT: Duration = Duration::from_millis(50);
 #[derive(Debug)]
 pub(in crate::gui) struct StepWork<T> {
     known: Option<(Arc<StepRecord>, Option<T>)>,
-    coming: Option<(Arc<StepRecord>, Receiver<Option<T>>)>,
+    coming: Option<Coming<T>>,
+}
+
+/// Result that is being computed.
+#[derive(Debug)]
+struct Coming<T> {
+    step: Arc<StepRecord>,
+    result: Receiver<Option<T>>,
+    /// Work that has not begun when this is dropped is left out: on one thread the work of many steps would queue up.
+    _wanted: Arc<()>,
 }
 
 impl<T> Default for StepWork<T> {
@@ -48,20 +57,22 @@ impl<T: Send + 'static> StepWork<T> {
         if self.has_result(step) {
             return;
         }
-        if !self.coming.as_ref().is_some_and(|(asked, _)| Arc::ptr_eq(asked, step)) {
-            self.coming = Some((Arc::clone(step), started(thread_name, in_background, work())));
+        if !self.coming.as_ref().is_some_and(|coming| Arc::ptr_eq(&coming.step, step)) {
+            let wanted = Arc::new(());
+            let result = started(thread_name, in_background, &wanted, work());
+            self.coming = Some(Coming { step: Arc::clone(step), result, _wanted: wanted });
         }
         self.receive();
     }
 
     /// Receives the result for the step that was requested last.
     pub(in crate::gui) fn receive(&mut self) {
-        let Some((_, coming)) = &self.coming else { return };
-        let result = match coming.try_recv() {
+        let Some(coming) = &self.coming else { return };
+        let result = match coming.result.try_recv() {
             Err(TryRecvError::Empty) => return,
             received => received.ok().flatten(),
         };
-        self.known = self.coming.take().map(|(step, _)| (step, result));
+        self.known = self.coming.take().map(|coming| (coming.step, result));
     }
 
     /// The step that was computed last, with its result.
@@ -70,14 +81,14 @@ impl<T: Send + 'static> StepWork<T> {
     }
 }
 
-fn started<T, W>(thread_name: &str, in_background: bool, work: W) -> Receiver<Option<T>>
+fn started<T, W>(thread_name: &str, in_background: bool, wanted: &Arc<()>, work: W) -> Receiver<Option<T>>
 where
     T: Send + 'static,
     W: Fn() -> Option<T> + Clone + Send + 'static,
 {
     let (sender, receiver) = channel();
-    let (later, given) = (sender.clone(), work.clone());
-    let background = move || drop(later.send(apart(given)));
+    let (later, given, wanted) = (sender.clone(), work.clone(), Arc::downgrade(wanted));
+    let background = move || drop(later.send(apart(move || wanted.upgrade().and_then(|_| given()))));
     if !(in_background && Builder::new().name(thread_name.to_owned()).spawn(background).is_ok()) {
         // Cannot fail: the receiver is returned below.
         drop(sender.send(work()));

@@ -31,10 +31,10 @@ pub use experiment::{
 pub use mechanism::{LaboratoryJoint, Mechanism, UnknownMechanism};
 pub use motion::{LaboratoryMotion, UnknownMotion};
 pub use planning::{
-    EnteredLimits, HandPlan, HandStep, ListedComparison, MotionLimits, MotionPlan, MotionPlanError, MotionPrediction,
-    MotionPredictor, MotionProblem, MotionStart, PLAN_DURATION_S, PLAN_KNOT_S, PLAN_SECONDS, PlanCriterion,
-    PlanOptions, PlanStart, PlanTable, PlannedParameter, PlannedRow, ReachedLimit, SCENE_M, SigmaRow, SufficientMotion,
-    move_point, plan_by_hand, plan_motion, scene_distances_m, sufficient_motion,
+    EnteredLimits, HandPlan, HandStep, LONGEST_MOTION_S, ListedComparison, MotionLimits, MotionPlan, MotionPlanError,
+    MotionPrediction, MotionPredictor, MotionProblem, MotionStart, NEXT_MOTION_S, PLAN_DURATION_S, PLAN_KNOT_S,
+    PLAN_SECONDS, PlanCriterion, PlanOptions, PlanStart, PlanTable, PlannedParameter, PlannedRow, ReachedLimit,
+    SCENE_M, SigmaRow, SufficientMotion, move_point, plan_by_hand, plan_motion, scene_distances_m, sufficient_motion,
 };
 pub use report::LaboratoryReport;
 pub use sensor_columns::{SensorColumns, UnknownColumns};

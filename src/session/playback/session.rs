@@ -213,6 +213,7 @@ impl Session {
         if !log.is_followed() {
             return;
         }
+        log.look_for_growth();
         let written = (log.duration_ns(), log.end().is_none());
         let recording = self.recording();
         if written != (recording.duration_ns, recording.is_being_written) {

@@ -14,16 +14,17 @@ impl Answer {
     }
 }
 
-/// Motion after a step of a run with a rig's camera, within slow limits of joints and vehicle, after which the parameters of
-/// the chain reach the required accuracy; `None` if they do, or if the step has no rank report.
+/// Motion of at most `longest_s` after a step of a run with a rig's camera, within slow limits of joints and vehicle, after
+/// which the parameters of the chain reach the required accuracy or are nearest to it; `None` if they do, or if the step has
+/// no rank report.
 ///
 /// The factor on the σ of the step holds for its information and for what the motion adds. Time offsets and intrinsics of
 /// sensors are not planned.
-pub fn motion_after(step: &StepRecord, rig: &Rig, camera_key: &str) -> Option<SufficientMotion> {
+pub fn motion_after(step: &StepRecord, rig: &Rig, camera_key: &str, longest_s: f64) -> Option<SufficientMotion> {
     let mut situation = Situation::of_step(&step.report, step.rank.as_ref()?, rig, camera_key)?;
     let factor = step.report.calibration.sigma_scale;
     situation.required = situation.required.divided(factor);
-    let mut motion = sufficient_motion(&situation, &EnteredLimits::SLOW.around(&situation))?;
+    let mut motion = sufficient_motion(&situation, &EnteredLimits::SLOW.around(&situation), longest_s)?;
     if let Some((_, sigma)) = &mut motion.remaining {
         *sigma *= factor;
     }
@@ -68,6 +69,7 @@ fn with_remaining(text: String, motion: &SufficientMotion, rig: &Rig) -> String 
 mod tests {
     use super::*;
     use crate::geometry::Dimension;
+    use crate::observability::laboratory::LONGEST_MOTION_S;
     use crate::session::tests::memory::recorded;
     use crate::simulation::{SyntheticOptions, synthetic_tracks};
 
@@ -86,7 +88,8 @@ mod tests {
         let required = &mut rig.required_accuracy;
         (required.translation_m, required.rotation_rad) =
             (0.95 * largest(Dimension::Length), 0.95 * largest(Dimension::Angle));
-        let motion = |step: &StepRecord| motion_after(step, &rig, &run.camera_key).expect("accuracy lacks");
+        let motion =
+            |step: &StepRecord| motion_after(step, &rig, &run.camera_key, LONGEST_MOTION_S).expect("accuracy lacks");
         let short = motion(&step);
         assert!(short.remaining.is_none(), "{:?}", short.moves);
         step.report.calibration.sigma_scale = 3.0;

@@ -11,6 +11,7 @@ use crate::calibration::ChainDistance;
 use crate::estimator::{Phase, Stage, StageTimes};
 use crate::geometry::seconds_from_ns;
 use crate::gimbal::{ClassicalChain, ParameterId};
+use crate::observability::laboratory::LONGEST_MOTION_S;
 use crate::observability::{Deficit, ParameterRate, information_rate};
 use crate::sensors::Rig;
 use crate::session::accuracy::path_length_m;
@@ -170,7 +171,7 @@ pub fn summarize_with_motion(recording: &Recording, run: &RunRecord, timing: boo
     let mut summary = summarize(recording, run, timing);
     let step = run.steps.iter().rev().find(|step| step.rank.is_some());
     if let Some(step) = step.filter(|_| summary.answer.needs_motion()) {
-        let motion = motion_after(step, &recording.rig, &run.camera_key);
+        let motion = motion_after(step, &recording.rig, &run.camera_key, LONGEST_MOTION_S);
         summary.answer.remedy = motion.map_or_else(String::new, |motion| motion_text(&motion, &recording.rig));
     }
     summary

@@ -32,6 +32,6 @@ pub use planned_row::PlannedRow;
 pub use problem::{MotionPrediction, MotionPredictor, MotionProblem, MotionStart};
 pub use search::move_point;
 pub use starts::PLAN_KNOT_S;
-pub use sufficient::{SufficientMotion, sufficient_motion};
+pub use sufficient::{LONGEST_MOTION_S, NEXT_MOTION_S, SufficientMotion, sufficient_motion};
 pub use summary::{PlanTable, PlannedParameter, SigmaRow};
 pub use windows::{SCENE_M, scene_distances_m};

@@ -12,8 +12,10 @@ use super::windows::WindowLayout;
 use crate::gimbal::ParameterId;
 use crate::simulation::MotionSplines;
 
-/// Longest motion that is tried, in seconds.
-const LONGEST_S: f64 = 10.0 * ADVICE_DURATION_S;
+/// Longest motion that is asked of a person, in seconds.
+pub const LONGEST_MOTION_S: f64 = 10.0 * ADVICE_DURATION_S;
+/// Longest motion that is asked for while a flight goes on, in seconds: it is found in a third of the time.
+pub const NEXT_MOTION_S: f64 = 3.0 * ADVICE_DURATION_S;
 /// Ratio of σ and required accuracy at which no further move is chosen: the last move loses a little because it ends at
 /// rest.
 const ENOUGH: f64 = 0.95;
@@ -30,18 +32,18 @@ pub struct SufficientMotion {
 }
 
 /// Shortest sequence of moves within the limits that brings all parameters of a situation to the required accuracy, or the
-/// best one of 40 s; each move is the one that lowers the largest ratio of σ and required accuracy most after those before.
+/// best one of `longest_s`; each move is the one that lowers the largest ratio of σ and required accuracy most after those before.
 ///
 /// `None` if all parameters reach it already, or if no motion makes any of them observable.
-pub fn sufficient_motion(situation: &Situation, limits: &MotionLimits) -> Option<SufficientMotion> {
-    let (objective, layout) = objective_and_windows(situation, LONGEST_S, PlanCriterion::Required, &[]).ok()?;
+pub fn sufficient_motion(situation: &Situation, limits: &MotionLimits, longest_s: f64) -> Option<SufficientMotion> {
+    let (objective, layout) = objective_and_windows(situation, longest_s, PlanCriterion::Required, &[]).ok()?;
     let columns = situation.information.ncols();
     let is_within = |gained: &DMatrix<f64>, limit: f64| objective.value(gained).is_some_and(|ratio| ratio <= limit);
     if is_within(&DMatrix::zeros(columns, columns), 1.0) {
         return None;
     }
     let problem = SearchProblem { situation, objective: &objective, limits, layout };
-    let moves = choose(&problem, LONGEST_S, &|gained| is_within(gained, ENOUGH));
+    let moves = choose(&problem, longest_s, &|gained| is_within(gained, ENOUGH));
     let duration_s = (moves.len() as f64 * layout.length_s).max(PLAN_DURATION_S[0]);
     let problem = SearchProblem { layout: WindowLayout::fine(duration_s), ..problem };
     let plan = HandPlan::of_moves(&problem, duration_s, &moves)?;

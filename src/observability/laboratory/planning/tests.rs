@@ -9,8 +9,9 @@ use super::objective::Objective;
 use super::search::SearchProblem;
 use super::windows::{WindowLayout, WindowRows, joined, rows_of_interval, rows_of_keyframes, trajectory};
 use super::{
-    EnteredLimits, MotionLimits, MotionPlan, MotionPlanError, MotionPredictor, MotionProblem, MotionStart,
-    PlanCriterion, PlanOptions, SufficientMotion, move_point, plan_by_hand, plan_motion, starts, sufficient_motion,
+    EnteredLimits, LONGEST_MOTION_S, MotionLimits, MotionPlan, MotionPlanError, MotionPredictor, MotionProblem,
+    MotionStart, PlanCriterion, PlanOptions, SufficientMotion, move_point, plan_by_hand, plan_motion, starts,
+    sufficient_motion,
 };
 use crate::camera::CameraModel;
 use crate::estimator::EstimatorConfig;
@@ -305,7 +306,8 @@ fn moves_end_when_every_parameter_is_as_accurate_as_required() {
         },
         ..situation("yaw-roll-pitch-offset", Some(0.5_f64.to_radians()))
     };
-    let of = |situation: &Situation| sufficient_motion(situation, &EnteredLimits::SLOW.around(situation));
+    let of =
+        |situation: &Situation| sufficient_motion(situation, &EnteredLimits::SLOW.around(situation), LONGEST_MOTION_S);
     assert_eq!(of(&situation(1.0, 90.0)), None, "the prior is enough");
     let loose = of(&situation(0.02, 1.0)).expect("a motion");
     assert_eq!(loose.remaining, None, "{loose:?}");
