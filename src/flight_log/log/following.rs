@@ -13,7 +13,7 @@ use crate::flight_log::container::{ContainerIndex, ScanEnd, ScanState};
 pub(super) const POLL: Duration = Duration::from_millis(20);
 /// Span of the messages with which a log is opened: enough for the rates of its topics.
 pub(super) const BEGIN_NS: u64 = 3_000_000_000;
-/// How long a reader waits for messages that are not written.
+/// Times for which a reader waits for messages that are not written.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Patience {
     /// Number of looks without growth after which a log without a footer is taken as ended.
