@@ -110,7 +110,6 @@ pub fn calibration_history(folders: &[PathBuf], run: Option<&str>) -> Result<His
 impl HistoryReport {
     fn new(found: FoundFlights, history: &FlightHistory) -> Self {
         let FoundFlights { flights, names, calibrated, other_runs, left_out } = found;
-        let dimensions: Vec<Dimension> = calibrated.columns.iter().map(|column| column.dimension()).collect();
         let required = &flights[flights.len() - 1].found.rig.required_accuracy;
         let parameters = names.iter().zip(&calibrated.columns).map(|(name, column)| HistoryParameter {
             name: name.clone(),
@@ -119,7 +118,7 @@ impl HistoryReport {
         });
         let change = |change: &Change| HistoryChange {
             parameter: names[change.column].clone(),
-            dimension: dimensions[change.column],
+            dimension: calibrated.columns[change.column].dimension(),
             by: change.by,
             sigma: change.sigma,
             instead: change.instead.iter().map(|column| names[*column].clone()).collect(),
@@ -232,10 +231,10 @@ impl HistoryChange {
     fn sentence(&self) -> String {
         let shown = Shown::of(self.dimension);
         let sign = if self.by < 0.0 { "" } else { "+" };
-        let (by, sigma) = (shown.value(self.by, self.sigma), shown.sigma(self.sigma));
+        let by = shown.value_with_sigma(self.by, self.sigma);
         let instead =
             if self.instead.is_empty() { String::new() } else { format!(" (or {})", self.instead.join(", ")) };
-        format!("{} {sign}{} ± {sigma}{instead}", self.parameter, by.trim_end_matches(shown.unit))
+        format!("{} {sign}{by}{instead}", self.parameter)
     }
 }
 
@@ -278,10 +277,8 @@ impl Display for HistoryReport {
         let columns = [left("parameter", 16)].into_iter().chain(intervals).chain([right("required", 12), left("", 0)]);
         let rows = self.parameters.iter().enumerate().map(|(place, parameter)| {
             let shown = Shown::of(parameter.dimension);
-            let value = |interval: &HistoryInterval| {
-                let (value, sigma) = (interval.values[place], interval.sigmas[place]);
-                format!("{} ± {}", shown.value(value, sigma).trim_end_matches(shown.unit), shown.sigma(sigma))
-            };
+            let value =
+                |interval: &HistoryInterval| shown.value_with_sigma(interval.values[place], interval.sigmas[place]);
             let newest = &self.intervals[self.intervals.len() - 1];
             let mark = if newest.sigmas[place] <= parameter.required { "  ✓" } else { "  ⚠" };
             [parameter.name.clone()]

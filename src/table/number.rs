@@ -72,6 +72,12 @@ impl Shown {
         format!("{}{}", fixed(stored * self.factor, decimals_for(stored_sigma * self.factor)), self.unit)
     }
 
+    /// A stored value with its standard deviation and unit: `4.2 ± 0.5 mm`.
+    pub fn value_with_sigma(self, stored: f64, stored_sigma: f64) -> String {
+        let value = self.value(stored, stored_sigma);
+        format!("{} ± {}", value.trim_end_matches(self.unit), self.sigma(stored_sigma))
+    }
+
     /// A standard deviation with its unit, with two digits.
     pub fn sigma(self, stored_sigma: f64) -> String {
         let sigma = stored_sigma * self.factor;

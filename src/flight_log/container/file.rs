@@ -59,10 +59,10 @@ impl LogFile {
         self.length.load(Ordering::Acquire)
     }
 
-    /// Looks at the length of a file that is being written; true if it has grown.
-    pub(crate) fn grow(&self) -> bool {
+    /// Looks at the length of a file that is being written.
+    pub(crate) fn grow(&self) {
         let now = self.file.metadata().map_or(0, |metadata| usize::try_from(metadata.len()).unwrap_or(0));
-        self.length.fetch_max(now, Ordering::AcqRel) < now
+        self.length.fetch_max(now, Ordering::AcqRel);
     }
 
     /// Limits that apply to reading the file.

@@ -42,7 +42,7 @@ impl FlightLog {
         check_magic(&file, path)?;
         let (mut index, mut growth) = (ContainerIndex::default(), Growth::new(patience));
         while growth.end.is_none() && index.span_ns() < BEGIN_NS {
-            if !growth.grow(&file, &mut index, &stop) {
+            if !(growth.has_news(&file, &stop) && growth.grow(&file, &mut index, &stop)) {
                 growth.polls += 1;
                 thread::sleep(POLL);
             }
@@ -69,6 +69,9 @@ impl FlightLog {
 
     /// Adds to the index what has been written since; true if there are more blocks.
     fn look(&self, growth: &mut Growth, stop: &AtomicBool) -> bool {
+        if !growth.has_news(&self.file, stop) {
+            return false;
+        }
         let mut index = ContainerIndex::clone(&self.index());
         let has_grown = growth.grow(&self.file, &mut index, stop);
         if has_grown {

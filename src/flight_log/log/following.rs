@@ -41,6 +41,8 @@ pub(super) struct Following {
 #[derive(Debug)]
 pub(super) struct Growth {
     scan: ScanState,
+    /// Length of the file that has been scanned, in bytes.
+    scanned: usize,
     /// Number of waits since the file grew.
     pub(super) polls: u32,
     pub(super) patience: Patience,
@@ -62,22 +64,34 @@ pub enum LogEnd {
 
 impl Growth {
     pub(super) fn new(patience: Patience) -> Self {
-        Self { scan: ScanState::default(), polls: 0, patience, end: None }
+        Self { scan: ScanState::default(), scanned: 0, polls: 0, patience, end: None }
+    }
+
+    /// True if the file has parts that are not scanned; otherwise the log may have ended.
+    pub(super) fn has_news(&mut self, file: &LogFile, stop: &AtomicBool) -> bool {
+        file.grow();
+        if file.len() > self.scanned {
+            return true;
+        }
+        self.end = self.end_of_wait(stop);
+        false
+    }
+
+    fn end_of_wait(&self, stop: &AtomicBool) -> Option<LogEnd> {
+        if stop.load(Ordering::Relaxed) {
+            return Some(LogEnd::Stopped);
+        }
+        (self.polls > self.patience.idle_polls).then_some(LogEnd::Idle)
     }
 
     /// Adds what has been written since; true if there are more blocks.
     pub(super) fn grow(&mut self, file: &LogFile, index: &mut ContainerIndex, stop: &AtomicBool) -> bool {
-        if file.grow() {
-            self.polls = 0;
-        }
+        (self.scanned, self.polls) = (file.len(), 0);
         let before = index.blocks.len();
         self.end = match index.scan(file, &mut self.scan) {
             ScanEnd::Footer => Some(LogEnd::Complete),
             ScanEnd::Limit => Some(LogEnd::Limit),
-            ScanEnd::EndOfFile | ScanEnd::Incomplete(_) if stop.load(Ordering::Relaxed) => Some(LogEnd::Stopped),
-            ScanEnd::EndOfFile | ScanEnd::Incomplete(_) => {
-                (self.polls > self.patience.idle_polls).then_some(LogEnd::Idle)
-            }
+            ScanEnd::EndOfFile | ScanEnd::Incomplete(_) => self.end_of_wait(stop),
         };
         index.blocks.len() > before
     }

@@ -95,7 +95,7 @@ fn paint_parameter(painter: &Painter, theme: &Theme, history: &HistoryFigure, pl
     let Some(newest) = intervals.last().copied() else { return };
     let shown = Shown::of(*dimension);
     let met = newest.1 <= *required;
-    let value = format!("{} ± {}", shown.value(newest.0, newest.1).trim_end_matches(shown.unit), shown.sigma(newest.1));
+    let value = shown.value_with_sigma(newest.0, newest.1);
     let head = painter.text(area.left_top() - vec2(0.0, 3.0), Align2::LEFT_BOTTOM, name, font(13.0), theme.text_strong);
     let color = if met { theme.text } else { theme.warn };
     painter.text(head.right_bottom() + vec2(10.0, 0.0), Align2::LEFT_BOTTOM, value, font(13.0), color);

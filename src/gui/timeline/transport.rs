@@ -173,7 +173,7 @@ fn progress_ui(ui: &mut Ui, ctx: &PanelContext<'_>) {
             let percent = fixed(100.0 * run.computed_fraction(ctx.recording.duration_ns), 0);
             let (label, computed_s) = (&run.spec.label, fixed(computed_ns as f64 * 1e-9, 1));
             if ctx.recording.is_being_written {
-                let behind = fixed(((ctx.recording.duration_ns - computed_ns) as f64 * 1e-9).max(0.0), 1);
+                let behind = fixed(run.behind_s(ctx.recording.duration_ns), 1);
                 let long = format!("{label} computed to {computed_s} s, {behind} s behind the log");
                 return (number, [long, format!("{label} {behind} s behind"), format!("{behind} s")]);
             }

@@ -1,7 +1,6 @@
 //! Progress and remaining time of the estimation of all runs.
 
-use crate::geometry::seconds_from_ns;
-use crate::session::{Recording, RunRecord};
+use crate::session::Recording;
 
 /// Seconds of computation before a remaining time is shown.
 const MIN_MEASURED_S: f64 = 1.5;
@@ -46,8 +45,8 @@ impl ProgressMeter {
             (elapsed_s >= MIN_MEASURED_S && done > 0.0).then(|| elapsed_s * (1.0 - fraction) / done)
         });
         if recording.is_being_written {
-            let reached_ns = recording.runs.iter().filter(|run| !run.has_ended()).map(RunRecord::reached_ns).min();
-            let behind_s = reached_ns.map(|reached_ns| seconds_from_ns(recording.duration_ns - reached_ns).max(0.0));
+            let open = recording.runs.iter().filter(|run| !run.has_ended());
+            let behind_s = open.map(|run| run.behind_s(recording.duration_ns)).max_by(f64::total_cmp);
             return Some(Progress { runs: fractions.len(), fraction, left_s: None, behind_s });
         }
         Some(Progress { runs: fractions.len(), fraction, left_s, behind_s: None })

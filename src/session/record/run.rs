@@ -12,7 +12,7 @@ use super::solver_trace::SolverTrace;
 use super::step::{RunWarning, StepFactorRows, StepRecord, add_warnings, warnings_of};
 use super::summary::SummaryOrder;
 use crate::estimator::{CalibrationPosterior, EventKind};
-use crate::geometry::RigidTransform;
+use crate::geometry::{RigidTransform, seconds_from_ns};
 use crate::session::accuracy::{AlignmentSums, TrajectoryAlignment};
 use crate::session::misfit::StepMisfit;
 use crate::session::plan::{ForkChanges, RunSpec};
@@ -314,6 +314,11 @@ impl RunRecord {
             return true;
         }
         false
+    }
+
+    /// Log time from the last step to the end of a log of this duration, in seconds.
+    pub fn behind_s(&self, duration_ns: i64) -> f64 {
+        seconds_from_ns((duration_ns - self.reached_ns()).max(0))
     }
 
     /// Computed fraction of the run, all passes together, from 0 to 1; `duration_ns` is the duration of the log.
