@@ -17,13 +17,15 @@
 //! | `files` | files that are no logs: rigs, stills, robot descriptions, tables; atomic output and limits of what is read | logs |
 //! | `flight_log` | MCAP in and out as typed events in time order; the rig of a log; logs of other recorders | the use of the events |
 //! | [`frontend`] | image in, feature tracks out | the estimator, so that runs share tracks |
-//! | [`simulation`] | a synthetic flight with ground truth, as tracks or written as a flight log | the estimator |
+//! | [`simulation`] | a synthetic flight with ground truth, its measurements and tracks | the estimator |
+//! | `simulated_log` | such a flight rendered and written as a flight log, with disturbances | the estimator |
 //! | [`estimator`] | window state, residuals, solver, marginalization; each step returns a `StepReport` | logs, screens, the wall clock |
 //! | [`observability`] | a linearization with typed columns in, ranks and null directions out | the origin of the linearization |
 //! | [`calibration`] | a whole flight of both cameras in, the offline calibration of extrinsics and gimbal out | logs, files |
 //! | `log_check` | problems of a log, with evidence and remedy | the estimator |
 //! | `session` | a cursor over a log, several runs, stored reports | pixels on a screen |
 //! | `study` | the runs defined by a plan, the tables of their results and the comparison of two studies | files, processes, screens |
+//! | `painting` | frames of egui painted without a window: pixels, SVG, PDF | what they show |
 //! | `gui` | panels, 3D scene, theme: reads reports, sends commands | the internals of the estimator |
 //! | `export` | the same tables and panels without a window | windows |
 //! | `interop` | a rig as the configuration of another estimator | runs |
@@ -31,11 +33,16 @@
 //! | `sweep` | the jobs of a study executed, and the files of their results | how jobs are distributed |
 //! | `desktop` | what the window asks of the machine: recent files, settings, written panels | sessions |
 //!
+//! The folders are four crates, so that they compile beside each other and an edit compiles again what depends on it:
+//! `dcvins-estimation` (`src/estimation.rs`) has those without files and screens, `dcvins-logs` (`src/logs.rs`) `files`,
+//! `flight_log`, `simulated_log`, `log_check`, `session` and `study`, `dcvins-painting` the folder of its name, and this one
+//! the rest. It re-exports the others, so that all paths begin here.
+//!
 //! Two folders differ from the order of the data flow: `simulation` comes after `frontend`, because flights without images
 //! use its track types; `calibration` comes after `observability`, with which it reports the unobservable parameters of
 //! its flight.
 //!
-//! Four absences hold the shape: nothing above `gui` names egui or wgpu; [`frontend`], [`estimator`] and [`calibration`]
+//! Four absences hold the shape: nothing above `painting` names egui or wgpu; [`frontend`], [`estimator`] and [`calibration`]
 //! do not know `flight_log`; [`frontend`] does not know the estimator; only `files`, `flight_log`, `export` and
 //! what follows it touch the file system, and only `gui` asks the wall clock for anything but the stage timings of a report.
 //!
@@ -89,38 +96,24 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-pub mod calibration;
-pub mod camera;
 #[cfg(feature = "gui")]
 pub mod desktop;
-pub mod estimator;
 #[cfg(feature = "logs")]
 pub mod export;
-pub mod faults;
-#[cfg(feature = "logs")]
-pub mod files;
-#[cfg(feature = "logs")]
-pub mod flight_log;
-pub mod frontend;
-pub mod geometry;
-pub mod gimbal;
 #[cfg(feature = "gui")]
 pub mod gui;
 #[cfg(feature = "logs")]
 pub mod interop;
 #[cfg(feature = "logs")]
-pub mod log_check;
-pub mod observability;
-pub mod optimization;
-#[cfg(feature = "logs")]
 pub mod report;
-pub mod sensors;
-#[cfg(feature = "logs")]
-pub mod session;
-pub mod simulation;
-#[cfg(feature = "logs")]
-pub mod study;
 #[cfg(feature = "logs")]
 pub mod sweep;
-pub mod table;
-pub mod text;
+
+pub use dcvins_estimation::{
+    calibration, camera, estimator, faults, frontend, geometry, gimbal, observability, optimization, sensors,
+    simulation, table, text,
+};
+#[cfg(feature = "logs")]
+pub use dcvins_logs::{files, flight_log, log_check, session, simulated_log, study};
+#[cfg(feature = "gui")]
+pub use dcvins_painting as painting;

@@ -9,11 +9,13 @@ use std::sync::Arc;
 use anyhow::{Context as _, Result};
 use dcvins::export::check_log;
 use dcvins::faults::{Fault, FaultKind, Sensor};
+use dcvins::files::RigFile as _;
 use dcvins::flight_log::FlightLog;
 use dcvins::geometry::RigidTransform;
 use dcvins::log_check::CheckReport;
 use dcvins::sensors::{CameraMount, CameraRig, Rig};
-use dcvins::simulation::{Disturbances, Experiment, SimulationOptions, simulate};
+use dcvins::simulated_log::{Disturbances, SimulationOptions, simulate};
+use dcvins::simulation::Experiment;
 use mcap::{MessageStream, Writer};
 
 use crate::cases::{Case, is_of_images, is_of_rig};

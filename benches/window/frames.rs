@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use dcvins::flight_log::ImageReader;
 use dcvins::gui::rendering::headless::{Headless, HeadlessOptions, PaintedFrame};
-use dcvins::gui::rendering::painter::Painter;
 use dcvins::gui::theme::{Theme, ThemeName};
 use dcvins::gui::window::{MainWindow, Preset, window_ui};
 use dcvins::gui::{PanelContext, Playback, Presentation, Selection};
+use dcvins::painting::painter::Painter;
 use dcvins::sensors::GrayImage;
 use dcvins::session::{Recording, SessionPlan};
 use dcvins::text::Named as _;

@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use anyhow::{Result, anyhow};
 use dcvins::gui::rendering::headless::{Headless, HeadlessOptions};
-use dcvins::gui::rendering::painter::Painter;
 use dcvins::gui::study::{StudyOptions, StudyState, study_ui};
 use dcvins::gui::theme::{Theme, ThemeName};
+use dcvins::painting::painter::Painter;
 use dcvins::study::view::Study;
 use egui::{Event, pos2};
 

@@ -1,5 +1,6 @@
 //! `dcvins check`: findings about a log and its rig.
 
+use dcvins::flight_log::RigOfLog as _;
 use std::path::PathBuf;
 use std::sync::Arc;
 

@@ -1,5 +1,6 @@
 //! `dcvins convert`: conversion of datasets and bags into logs, and of logs into EuRoC folders.
 
+use dcvins::flight_log::RigOfLog as _;
 use std::path::PathBuf;
 use std::sync::Arc;
 

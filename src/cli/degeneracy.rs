@@ -1,5 +1,6 @@
 //! `dcvins degeneracy`: observability of the calibration by mechanism, parameterization and motion, without a log.
 
+use dcvins::files::RigFile as _;
 use std::path::PathBuf;
 
 use anyhow::{Context as _, Result, bail};

@@ -1,5 +1,7 @@
 //! `dcvins export`: a rig as the configuration of another program, or as a robot description.
 
+use dcvins::files::RigFile as _;
+use dcvins::flight_log::RigOfLog as _;
 use std::path::PathBuf;
 use std::sync::Arc;
 

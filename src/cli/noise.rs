@@ -1,5 +1,6 @@
 //! `dcvins noise`: noise densities of an IMU from stationary stretches, or from a flight.
 
+use dcvins::flight_log::RigOfLog as _;
 use std::path::PathBuf;
 use std::sync::Arc;
 

@@ -1,5 +1,6 @@
 //! `dcvins plan`: the motion that calibrates a rig, within the limits of its joints and of the vehicle.
 
+use dcvins::files::RigFile as _;
 use std::fmt::{self, Display, Formatter};
 use std::ops::RangeInclusive;
 use std::path::PathBuf;

@@ -1,12 +1,14 @@
 //! `dcvins simulate`: a synthetic flight with ground truth.
 
+use dcvins::files::RigFile as _;
 use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::{Args, ValueEnum};
 use dcvins::export;
 use dcvins::sensors::Rig;
-use dcvins::simulation::{self, Disturbances, Experiment, SimulationError, SimulationOptions, WorldKind};
+use dcvins::simulated_log::{self, Disturbances, SimulationError, SimulationOptions};
+use dcvins::simulation::{Experiment, WorldKind};
 use dcvins::text::key_list;
 
 use crate::cli::exit::ExitOutcome;
@@ -184,7 +186,7 @@ pub(crate) fn simulate(arguments: &SimulateArguments) -> Result<ExitOutcome> {
     let interrupt = Interrupt::watch()?;
     export::check_simulated_log(&arguments.output, arguments.force)?;
     let progress = Progress::new();
-    let simulated = simulation::simulate_interruptible(&options, &arguments.output, &mut |at| {
+    let simulated = simulated_log::simulate_interruptible(&options, &arguments.output, &mut |at| {
         let ratio = at.images_done as f64 / at.images_total.max(1) as f64;
         progress.show(ratio, || format!("{} of {} images", at.images_done, at.images_total));
         interrupt.control_flow()

@@ -1,5 +1,6 @@
 //! Access of the window to files and memory of the machine.
 
+use crate::files::RigFile as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, channel};

@@ -8,7 +8,8 @@ use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use directories::ProjectDirs;
 
 use crate::gui::desktop::SampleProgress;
-use crate::simulation::{Experiment, SimulationOptions, simulate_interruptible};
+use crate::simulated_log::{SimulationOptions, simulate_interruptible};
+use crate::simulation::Experiment;
 
 const NAME: &str = "garden.mcap";
 const DURATION_S: f64 = 8.5;
@@ -48,7 +49,7 @@ fn write(folder: &Path, options: &SimulationOptions, sender: &SyncSender<SampleP
     let path = folder.join(NAME);
     fs::create_dir_all(folder)
         .map_err(|error| format!("cannot make the folder of the sample flight: {error}: {}", folder.display()))?;
-    let mut progress = |at: crate::simulation::SimulationProgress| {
+    let mut progress = |at: crate::simulated_log::SimulationProgress| {
         let message = SampleProgress::Images { done: at.images_done, total: at.images_total };
         match sender.try_send(message) {
             Err(TrySendError::Disconnected(_)) => ControlFlow::Break(()),

@@ -153,8 +153,7 @@ impl Estimator {
     }
 
     /// Calibration before any measurement, with the covariance of its prior.
-    #[cfg(test)]
-    pub(crate) fn start_posterior(&self) -> CalibrationPosterior {
+    pub fn start_posterior(&self) -> CalibrationPosterior {
         let calibrations = self.calibration();
         let count = calibrations.dof();
         let information = calibrations.prior_jacobian();

@@ -1,5 +1,6 @@
 //! Output files of `dcvins calibrate`.
 
+use crate::files::RigFile as _;
 use std::path::Path;
 
 use super::calibration_report::CalibrationReport;

@@ -99,9 +99,11 @@ mod tests {
 
     use super::*;
     use crate::faults::{Choice, FaultKind, ImageFlip};
+    use crate::flight_log::RigOfLog as _;
     use crate::geometry::SignedAxes;
     use crate::log_check::{Agreement, Area, Finding, FindingInterval, Severity};
-    use crate::simulation::{Experiment, SimulationOptions, simulate};
+    use crate::simulated_log::{SimulationOptions, simulate};
+    use crate::simulation::Experiment;
 
     fn short_log(folder: &Path) -> (Arc<FlightLog>, Rig) {
         let experiment = SimulationOptions::new(Experiment::T1);

@@ -1,5 +1,6 @@
 //! Files of `dcvins excerpt`: one log with its rig per stretch, and `excerpt.json` with their effect on the calibration.
 
+use crate::files::RigFile as _;
 use std::fmt::{self, Display, Formatter};
 use std::path::{Path, PathBuf};
 

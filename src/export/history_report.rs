@@ -401,6 +401,7 @@ mod tests {
     use super::*;
     use crate::estimator::{CalibrationPosterior, CameraPosterior, ColumnBelief};
     use crate::export::posterior::{POSTERIOR, posterior_text};
+    use crate::files::RigFile as _;
     use crate::gimbal::{Chain, ClassicalChain, Parameterization};
     use crate::sensors::Rig;
 

@@ -1,5 +1,6 @@
 //! `posterior.json`: values and covariance of a calibration, from which another flight starts (`--prior`).
 
+use crate::files::RigFile as _;
 use std::fmt::{self, Display, Formatter};
 use std::fs;
 use std::path::Path;

@@ -1,5 +1,6 @@
 //! Output files of `dcvins run` for each run.
 
+use crate::files::RigFile as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 

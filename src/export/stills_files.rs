@@ -1,5 +1,6 @@
 //! Output files of `dcvins calibrate --stills`.
 
+use crate::files::RigFile as _;
 use std::path::{Path, PathBuf};
 
 use super::calibration_files::sigmas_yaml;

@@ -436,3 +436,15 @@ fn imu_scale(fault: &Fault) -> (String, String) {
     };
     (format!("the {sensor} measures {measured:.3} times the {quantity}"), remedy)
 }
+
+impl Severity {
+    /// Lowercase name, printed before a finding.
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::Good => "good",
+            Self::Note => "note",
+            Self::Warning => "warning",
+            Self::Error => "error",
+        }
+    }
+}

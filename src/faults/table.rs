@@ -402,3 +402,18 @@ const fn names() -> [(FaultKind, &'static str); TABLE.len()] {
     }
     names
 }
+
+impl Area {
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::Log => "log",
+            Self::Time => "time",
+            Self::Imu => "IMU",
+            Self::Motion => "motion",
+            Self::Encoders => "encoders",
+            Self::Images => "images",
+            Self::Intrinsics => "intrinsics",
+            Self::Extrinsics => "extrinsics",
+        }
+    }
+}

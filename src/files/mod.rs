@@ -8,7 +8,8 @@ pub mod output;
 pub(crate) mod rig;
 pub mod stills;
 pub mod urdf;
-pub(crate) mod yaml;
+pub mod yaml;
 
 pub use self::error::FileError;
 pub use self::limits::{LimitExceeded, LimitKind, LimitSetting, LogLimits};
+pub use self::rig::RigFile;

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 /// Shortest decimal that reads back as the same number, in the notation of YAML 1.1 (`PyYAML`), which requires a
 /// point before an exponent, and a sign in it.
-pub(crate) fn number(value: f64) -> String {
+pub fn number(value: f64) -> String {
     let written = format!("{value:?}");
     let Some((mantissa, exponent)) = written.split_once('e') else { return written };
     let point = if mantissa.contains('.') { "" } else { ".0" };
@@ -19,12 +19,12 @@ pub(crate) fn without_opencv_head(text: &str) -> Cow<'_, str> {
 }
 
 /// Numbers as a YAML list in brackets.
-pub(crate) fn numbers(values: &[f64]) -> String {
+pub fn numbers(values: &[f64]) -> String {
     format!("[{}]", values.iter().map(|value| number(*value)).collect::<Vec<_>>().join(", "))
 }
 
 /// Plain scalar if YAML reads it as a string, else a quoted one.
-pub(crate) fn text(value: &str) -> String {
+pub fn text(value: &str) -> String {
     let plain = value.starts_with(|first: char| first.is_ascii_alphabetic() || first == '/')
         && value.chars().all(|letter| letter.is_ascii_alphanumeric() || "/_-.".contains(letter))
         && !["true", "false", "null", "yes", "no", "on", "off", "y", "n"]

@@ -8,7 +8,7 @@ mod error;
 pub(crate) mod grey_levels;
 pub(crate) mod images;
 pub(crate) mod imu;
-pub(crate) mod joints;
+pub mod joints;
 pub(crate) mod log;
 pub(crate) mod messages;
 mod rig;
@@ -28,13 +28,15 @@ pub use self::log::following::LogEnd;
 pub use self::log::topic_info::TopicInfo;
 pub use self::messages::MessageKind;
 pub use self::rig::template as rig_template;
-pub use self::rig::{MissingSensors, RigCandidate, is_imu_file_of, is_rig_name, missing_sensors, rig_candidates};
+pub use self::rig::{
+    MissingSensors, RigCandidate, RigOfLog, is_imu_file_of, is_rig_name, missing_sensors, rig_candidates,
+};
 pub(crate) use self::stream::image_stamps;
 pub use self::stream::{
     FrameStream, RecordedImage, SensorFrame, SensorSamples, ground_truth_poses, imu_samples, joint_samples,
     nominal_joint_sigma_rad, recorded_images,
 };
-pub(crate) use self::trajectory::geodesy::Geodetic;
+pub use self::trajectory::geodesy::Geodetic;
 pub use self::trajectory::{BATCH_REFERENCE, RecordedPose, is_batch_reference, read_trajectory_file};
 pub use self::warning::{LogWarning, Magnitude, WarningKind};
 pub use self::writer::excerpt::{ExcerptReport, write_excerpt};

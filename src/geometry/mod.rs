@@ -19,7 +19,7 @@ pub(crate) mod triangular_factor;
 
 pub use dimension::Dimension;
 pub use rigid_transform::RigidTransform;
-pub(crate) use scalars::{during, planar_length};
+pub use scalars::{during, planar_length};
 pub use scalars::{
     ns_from_seconds, principal_angle, seconds_from_ns, smooth_step, tangent_basis, ticks, vertical_angle, wrap_angle,
 };

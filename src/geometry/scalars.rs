@@ -15,7 +15,7 @@ pub fn ns_from_seconds(time_s: f64) -> i64 {
 }
 
 /// True if a time lies in an interval given as start and length, both in seconds; false without an interval.
-pub(crate) fn during(interval_s: Option<[f64; 2]>, time_s: f64) -> bool {
+pub fn during(interval_s: Option<[f64; 2]>, time_s: f64) -> bool {
     interval_s.is_some_and(|[start_s, length_s]| time_s >= start_s && time_s < start_s + length_s)
 }
 
@@ -46,7 +46,7 @@ pub fn vertical_angle(rotation: &UnitQuaternion<f64>) -> f64 {
 #[expect(clippy::imprecise_flops, reason = "`hypot` is a call into the C library, this a vector instruction")]
 #[expect(clippy::inline_always, reason = "code that is not inlined is not compiled for the registers of its caller")]
 #[inline(always)]
-pub(crate) fn planar_length([x, y]: [f32; 2]) -> f32 {
+pub fn planar_length([x, y]: [f32; 2]) -> f32 {
     (x * x + y * y).sqrt()
 }
 

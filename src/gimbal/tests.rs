@@ -1,15 +1,11 @@
 mod conversions;
 mod derivatives;
 pub(crate) mod golden;
+pub(crate) mod named;
 mod priors;
 pub(crate) mod random;
 
-use super::{ParameterId, ParameterNames};
-
-/// Parses a parameter name, with links by number: `L1.alpha`.
-pub(crate) fn parameter(name: &str) -> ParameterId {
-    ParameterNames::default().parse(name).unwrap_or_else(|| panic!("'{name}' is no parameter"))
-}
+pub(crate) use self::named::parameter;
 
 #[test]
 fn intrinsics_of_the_imu_are_shown_in_percent() {

@@ -7,7 +7,7 @@ use super::samples::{rigid_recording, sample_images, sample_recording, sample_re
 use super::tests::{keep_screenshot, with_context};
 use super::theme::{Theme, ThemeName};
 use super::{Panel as _, PanelContext, Selection};
-use crate::gimbal::tests::parameter;
+use crate::gui::tests::parameter;
 use crate::session::Recording;
 
 const SECOND_NS: i64 = 1_000_000_000;

@@ -1,3 +1,7 @@
+#[path = "../gimbal/tests/named.rs"]
+mod named;
+
+pub(crate) use self::named::parameter;
 use super::theme::Theme;
 use super::{ImageSource, PanelContext, Playback, Presentation, Selection};
 use crate::gui::samples::{first_tracked_frame, sample_images, sample_recording};

@@ -7,6 +7,7 @@ use serde_json::Value;
 
 use super::*;
 use crate::camera::CameraModel;
+use crate::files::RigFile as _;
 use crate::geometry::RigidTransform;
 use crate::sensors::{CameraMask, CameraMount, GrayImage, ImageMask, ImuIntrinsics, ImuIntrinsicsParameters};
 

@@ -5,6 +5,7 @@ use std::path::Path;
 use nalgebra::Vector6;
 
 use super::{calibrated_description, robot_description};
+use crate::files::RigFile as _;
 use crate::files::urdf::{CameraAxes, RobotModel};
 use crate::geometry::SplitMix64;
 use crate::sensors::Rig;

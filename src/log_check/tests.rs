@@ -12,6 +12,7 @@ use tempfile::TempDir;
 use super::check;
 use super::report::{CheckReport, ImageRotation, Severity};
 use crate::camera::CameraModel;
+use crate::files::RigFile as _;
 use crate::flight_log::{FlightLog, LogError, LogWriter, LogWriterOptions, MessageTimes};
 use crate::geometry::SplitMix64;
 use crate::sensors::{GrayImage, Rig};

@@ -6,7 +6,7 @@
 //! unknowns by its own structure, as the landmarks of a window, is a [`DampedProblem`].
 
 /// Normal equations `H δ = −g`, solved for damped steps.
-pub(crate) trait DampedEquations {
+pub trait DampedEquations {
     type Step;
 
     /// Solves `(H + λ diag H) δ = −g`; `None` unless the matrix is positive definite.
@@ -15,7 +15,7 @@ pub(crate) trait DampedEquations {
 
 /// Least-squares problem whose equations are solved by themselves: dense ([`super::NormalEquations`]) or with groups of
 /// unknowns ([`super::TwoLevelEquations`]).
-pub(crate) trait LeastSquares {
+pub trait LeastSquares {
     type Estimate;
     type Equations: DampedEquations;
 
@@ -47,7 +47,7 @@ impl<P: LeastSquares> DampedProblem for P {
 }
 
 /// Least-squares problem whose normal equations can be damped.
-pub(crate) trait DampedProblem {
+pub trait DampedProblem {
     type Estimate;
     /// Normal equations at an estimate.
     type Equations;
@@ -69,19 +69,19 @@ pub(crate) trait DampedProblem {
 
 /// Limits and damping of [`minimize`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct DampedOptions {
+pub struct DampedOptions {
     /// Largest number of tried steps, accepted or not.
-    pub(crate) iterations: usize,
+    pub iterations: usize,
     /// Convergence threshold: a step lowers the cost by no more than this fraction and the problem
     /// [is settled](DampedProblem::is_settled).
-    pub(crate) relative_cost_tolerance: f64,
+    pub relative_cost_tolerance: f64,
     /// λ of the first step.
-    pub(crate) first_damping: f64,
-    pub(crate) min_damping: f64,
+    pub first_damping: f64,
+    pub min_damping: f64,
     /// λ at which the solver stops.
-    pub(crate) max_damping: f64,
+    pub max_damping: f64,
     /// Factor on λ after a rejected step or singular equations.
-    pub(crate) growth: f64,
+    pub growth: f64,
 }
 
 /// Factor on λ after an accepted step.
@@ -111,8 +111,8 @@ pub(crate) struct Iteration {
 }
 
 #[derive(Clone, Debug)]
-pub(crate) struct DampedSolution<E> {
-    pub(crate) estimate: E,
+pub struct DampedSolution<E> {
+    pub estimate: E,
     /// Steps with solvable equations, in order.
     pub(crate) iterations: Vec<Iteration>,
     /// Number of tried steps, including those with singular equations.
@@ -121,7 +121,7 @@ pub(crate) struct DampedSolution<E> {
 }
 
 /// Minimizes the cost of a problem from `start`.
-pub(crate) fn minimize<P: DampedProblem>(
+pub fn minimize<P: DampedProblem>(
     problem: &mut P,
     start: P::Estimate,
     options: &DampedOptions,

@@ -7,7 +7,7 @@
 //! unknowns, and is solved by `damped::minimize`.
 
 mod cholesky;
-pub(crate) mod damped;
+pub mod damped;
 mod landmark;
 mod landmark_rows;
 mod normal_equations;
@@ -24,7 +24,7 @@ pub(crate) use cholesky::{Cholesky, DIAGONAL_FLOOR};
 pub(crate) use landmark::Landmark;
 pub use landmark::LandmarkModel;
 pub(crate) use landmark_rows::{LandmarkRows, OBSERVATION_ROWS};
-pub(crate) use normal_equations::{
+pub use normal_equations::{
     MIN_PRIOR_VARIANCE, NormalEquations, damp, fix, gauss_newton, prior_square_root_information,
     square_root_information,
 };

@@ -11,14 +11,14 @@ use super::damped::DampedEquations;
 
 /// Normal equations over `D` unknowns, a number known at compile time (`Const<N>`) or not (`Dyn`).
 #[derive(Clone, Debug)]
-pub(crate) struct NormalEquations<D: Dim>
+pub struct NormalEquations<D: Dim>
 where
     DefaultAllocator: Allocator<D> + Allocator<D, D>,
 {
     /// `H` (n × n); only its lower triangle is read.
-    pub(crate) hessian: OMatrix<f64, D, D>,
+    pub hessian: OMatrix<f64, D, D>,
     /// `g` (n × 1).
-    pub(crate) gradient: OVector<f64, D>,
+    pub gradient: OVector<f64, D>,
 }
 
 impl<D: Dim> NormalEquations<D>
@@ -26,7 +26,7 @@ where
     DefaultAllocator: Allocator<D> + Allocator<D, D>,
 {
     /// Equations before any row is added: H and g are zero.
-    pub(crate) fn zeros(unknowns: D) -> Self {
+    pub fn zeros(unknowns: D) -> Self {
         Self {
             hessian: OMatrix::zeros_generic(unknowns, unknowns),
             gradient: OVector::zeros_generic(unknowns, nalgebra::U1),
@@ -34,7 +34,7 @@ where
     }
 
     /// Adds rows: `H += w JᵀJ`, `g += w Jᵀr`.
-    pub(crate) fn add<R: Dim>(
+    pub fn add<R: Dim>(
         &mut self,
         residual: &nalgebra::Vector<f64, R, impl Storage<f64, R>>,
         jacobian: &nalgebra::Matrix<f64, R, D, impl Storage<f64, R, D>>,
@@ -64,18 +64,18 @@ where
     }
 
     /// Removes an unknown: its step is zero.
-    pub(crate) fn fix(&mut self, unknown: usize) {
+    pub fn fix(&mut self, unknown: usize) {
         fix(&mut self.hessian, &mut self.gradient, unknown);
     }
 
     /// Adds the row of one unknown with residual `error` and information `1/σ²`.
-    pub(crate) fn add_diagonal(&mut self, unknown: usize, error: f64, information: f64) {
+    pub fn add_diagonal(&mut self, unknown: usize, error: f64, information: f64) {
         self.hessian[(unknown, unknown)] += information;
         self.gradient[unknown] += information * error;
     }
 
     /// Gauss–Newton step `δ = −H⁻¹ g`; `None` unless `H` is positive definite.
-    pub(crate) fn step(self) -> Option<OVector<f64, D>> {
+    pub fn step(self) -> Option<OVector<f64, D>> {
         Some(-self.hessian.cholesky()?.solve(&self.gradient))
     }
 }
@@ -94,7 +94,7 @@ where
 }
 
 /// Removes an unknown from normal equations: its step is zero.
-pub(crate) fn fix<D: Dim>(hessian: &mut OMatrix<f64, D, D>, gradient: &mut OVector<f64, D>, unknown: usize)
+pub fn fix<D: Dim>(hessian: &mut OMatrix<f64, D, D>, gradient: &mut OVector<f64, D>, unknown: usize)
 where
     DefaultAllocator: Allocator<D> + Allocator<D, D>,
 {
@@ -105,7 +105,7 @@ where
 }
 
 /// `H ← H + λ diag H`.
-pub(crate) fn damp<D: Dim>(hessian: &mut OMatrix<f64, D, D>, damping: f64)
+pub fn damp<D: Dim>(hessian: &mut OMatrix<f64, D, D>, damping: f64)
 where
     DefaultAllocator: Allocator<D, D>,
 {
@@ -116,7 +116,7 @@ where
 
 /// `W` (n × n, lower triangular) with `WᵀW = C⁻¹`, which whitens residuals of covariance `C`: the inverse of its Cholesky
 /// factor. `None` unless `C` is positive definite.
-pub(crate) fn square_root_information<D: Dim>(covariance: OMatrix<f64, D, D>) -> Option<OMatrix<f64, D, D>>
+pub fn square_root_information<D: Dim>(covariance: OMatrix<f64, D, D>) -> Option<OMatrix<f64, D, D>>
 where
     DefaultAllocator: Allocator<D> + Allocator<D, D>,
 {
@@ -125,10 +125,10 @@ where
 }
 
 /// Variance added to every unknown of a prior, so that its covariance stays regular when it fixes one.
-pub(crate) const MIN_PRIOR_VARIANCE: f64 = 1e-12;
+pub const MIN_PRIOR_VARIANCE: f64 = 1e-12;
 
 /// [`square_root_information`] of a prior with [`MIN_PRIOR_VARIANCE`]; of its diagonal alone if it is not positive definite.
-pub(crate) fn prior_square_root_information(mut covariance: DMatrix<f64>) -> DMatrix<f64> {
+pub fn prior_square_root_information(mut covariance: DMatrix<f64>) -> DMatrix<f64> {
     for unknown in 0..covariance.nrows() {
         covariance[(unknown, unknown)] += MIN_PRIOR_VARIANCE;
     }
@@ -141,7 +141,7 @@ pub(crate) fn prior_square_root_information(mut covariance: DMatrix<f64>) -> DMa
 /// `plus` moves the estimate on its manifold, `x ← x ⊞ δ`, and returns true after a step that is short enough to stop.
 /// `None` if the equations are singular, a step is not finite, or `linearize` has no equations; the estimate is then the last
 /// one before.
-pub(crate) fn gauss_newton<E, D: Dim>(
+pub fn gauss_newton<E, D: Dim>(
     estimate: &mut E,
     iterations: usize,
     mut linearize: impl FnMut(&E) -> Option<NormalEquations<D>>,

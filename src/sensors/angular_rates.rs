@@ -116,7 +116,7 @@ impl AngularRates {
     }
 
     /// Orientation `first_from_now` since the first sample; `None` outside the samples and in a gap.
-    pub(crate) fn orientation_at(&self, time_s: f64) -> Option<UnitQuaternion<f64>> {
+    pub fn orientation_at(&self, time_s: f64) -> Option<UnitQuaternion<f64>> {
         let (index, fraction) = self.place(time_s)?;
         let (before, after) = (self.rates_rad_per_s[index], self.rates_rad_per_s[index + 1]);
         let step_s = fraction * (self.times_s[index + 1] - self.times_s[index]);

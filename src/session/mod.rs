@@ -35,7 +35,7 @@ pub use diagnosis::{LogFaults, diagnose};
 pub use engine::{
     BreakpointHit, CalibrationErrors, CalibrationRequest, CalibrationRun, CalibrationRunError, Computation,
     FlightNoiseError, SnapshotUse, Stopwatch, calibrate, camera_rotations, check_log, compute, compute_until,
-    fit_flight_noise, image_rotations, situation_before_flight,
+    fit_flight_noise, image_rotations, record_synthetic, situation_before_flight,
 };
 pub use misfit::AgreementValue;
 pub use plan::{

@@ -10,7 +10,7 @@ const PERIOD_S: f64 = 8.0;
 
 /// Direction of what there is to see, and swing of the vehicle's heading about it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Aim {
+pub struct Aim {
     /// Position in plan view of what there is to see; `None` if that lies along the route.
     pub(crate) target_m: Option<Vector2<f64>>,
     /// Amplitude of the swing.
@@ -34,9 +34,9 @@ impl Aim {
 }
 
 /// Flight whose heading swings about the direction of what there is to see.
-pub(crate) struct Aimed {
-    pub(crate) flight: Box<dyn Flight>,
-    pub(crate) aim: Aim,
+pub struct Aimed {
+    pub flight: Box<dyn Flight>,
+    pub aim: Aim,
 }
 
 impl Flight for Aimed {

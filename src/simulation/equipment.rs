@@ -15,13 +15,13 @@ use crate::sensors::{
 use crate::text::Named;
 
 /// Gravity in the simulated worlds, in m/s².
-pub(crate) const GRAVITY_M_PER_S2: f64 = 9.81;
+pub const GRAVITY_M_PER_S2: f64 = 9.81;
 /// Rate of the IMU and of the encoders.
 pub(crate) const IMU_RATE_HZ: f64 = 200.0;
 /// Topic of the ground truth.
-pub(crate) const GROUND_TRUTH_TOPIC: &str = "/ground_truth/odometry";
+pub const GROUND_TRUTH_TOPIC: &str = "/ground_truth/odometry";
 /// Topic of the encoders.
-pub(crate) const JOINT_TOPIC: &str = "/gimbal/joint_states";
+pub const JOINT_TOPIC: &str = "/gimbal/joint_states";
 /// Image size of the intrinsics below.
 const NOMINAL_SIZE_PX: [usize; 2] = [640, 480];
 
@@ -48,7 +48,7 @@ const INTRINSICS_PX: [[f64; 4]; 4] = [
 ];
 
 /// Camera model at this image size; `which` is the index in [`INTRINSICS_PX`].
-pub(crate) fn camera_model(which: usize, lens: Lens, resolution_px: [usize; 2]) -> CameraModel {
+pub fn camera_model(which: usize, lens: Lens, resolution_px: [usize; 2]) -> CameraModel {
     let [fx, fy, cx, cy] = INTRINSICS_PX[which];
     let distortion = match (lens, which) {
         (Lens::Pinhole, _) => Distortion::None,
@@ -69,27 +69,27 @@ pub(crate) fn camera_model(which: usize, lens: Lens, resolution_px: [usize; 2]) 
 
 /// Contents of a rig.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Equipment {
-    pub(crate) gimbal_camera: bool,
-    pub(crate) static_camera: bool,
+pub struct Equipment {
+    pub gimbal_camera: bool,
+    pub static_camera: bool,
     /// Distance of a second static camera to the right of the static one, in metres; `None` without one.
-    pub(crate) stereo_baseline_m: Option<f64>,
+    pub stereo_baseline_m: Option<f64>,
     /// True for a second camera on the gimbal.
-    pub(crate) second_gimbal_camera: bool,
-    pub(crate) lens: Lens,
-    pub(crate) resolution_px: [usize; 2],
-    pub(crate) camera_rate_hz: f64,
-    pub(crate) static_camera_rate_hz: f64,
-    pub(crate) camera_time_offset_s: f64,
-    pub(crate) readout_s: f64,
-    pub(crate) encoder_sigma_rad: Option<f64>,
+    pub second_gimbal_camera: bool,
+    pub lens: Lens,
+    pub resolution_px: [usize; 2],
+    pub camera_rate_hz: f64,
+    pub static_camera_rate_hz: f64,
+    pub camera_time_offset_s: f64,
+    pub readout_s: f64,
+    pub encoder_sigma_rad: Option<f64>,
     /// True for an IMU on the gimbal.
-    pub(crate) gimbal_imu: bool,
+    pub gimbal_imu: bool,
 }
 
 impl Equipment {
     /// True rig; the manufacturing errors of its chain are drawn from a random stream.
-    pub(crate) fn true_rig(&self, name: &str, random: &mut RandomStream) -> Rig {
+    pub fn true_rig(&self, name: &str, random: &mut RandomStream) -> Rig {
         let chain = true_chain(random);
         let static_extrinsics = static_extrinsics(random);
         let right = self.stereo_baseline_m.map(|baseline_m| beside(Vector3::x() * baseline_m, random));

@@ -48,7 +48,7 @@ impl Named for WorldKind {
 
 impl WorldKind {
     /// Environment that has this variant; `None` for a variant of both environments.
-    pub(crate) fn environment(self) -> Option<Environment> {
+    pub fn environment(self) -> Option<Environment> {
         match self {
             Self::Textured => None,
             Self::Plain => Some(Environment::House),
@@ -58,9 +58,9 @@ impl WorldKind {
 }
 
 /// Side of a block of the town including half of the adjacent roads, in metres.
-pub(crate) const TOWN_PITCH_M: f64 = 30.0;
+pub const TOWN_PITCH_M: f64 = 30.0;
 /// Number of roads per direction of the town.
-pub(crate) const TOWN_ROADS: usize = 4;
+pub const TOWN_ROADS: usize = 4;
 
 /// Names as in the paper and on the command line.
 impl Named for Experiment {
@@ -103,7 +103,7 @@ impl Experiment {
     }
 
     /// Orientation of the gimbal camera.
-    pub(crate) fn look_around(self, random: &mut RandomStream) -> LookAround {
+    pub fn look_around(self, random: &mut RandomStream) -> LookAround {
         match self {
             // Towards the house, which lies to the left of the path.
             Self::T1 => LookAround::new([25.0, 25.0], [-6.0, 8.0], 0.0, random),
@@ -116,13 +116,13 @@ impl Experiment {
 
     /// Direction of what there is to see, and a swing of this amplitude about it: the house in environment 1, the street
     /// ahead in environment 2.
-    pub(crate) fn aim(self, swing_rad: f64) -> Aim {
+    pub fn aim(self, swing_rad: f64) -> Aim {
         let target_m = (self.environment() == Environment::House).then(Vector2::zeros);
         Aim { target_m, swing_rad }
     }
 
     /// Flight of the experiment; a path that is not closed has at least this length.
-    pub(crate) fn flight(self, length_m: f64, random: &mut RandomStream) -> Box<dyn Flight> {
+    pub fn flight(self, length_m: f64, random: &mut RandomStream) -> Box<dyn Flight> {
         self.flight_at(Manoeuvres::aggressive(), length_m, random)
     }
 

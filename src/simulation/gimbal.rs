@@ -12,7 +12,7 @@ use crate::gimbal::{ClassicalChain, DhLink};
 use crate::sensors::{GimbalRig, Joint};
 
 /// Joints of the paper's gimbal (§5.1): yaw ±180°, roll ±25°, pitch −120° to 30°.
-pub(crate) fn joints() -> Vec<Joint> {
+pub fn joints() -> Vec<Joint> {
     let joint = |name: &str, low_deg: f64, high_deg: f64| Joint {
         name: name.to_owned(),
         limits_rad: (low_deg.to_radians(), high_deg.to_radians()),
@@ -24,7 +24,7 @@ pub(crate) fn joints() -> Vec<Joint> {
 ///
 /// Nominal: base z down; yaw about it, roll about the forward axis, pitch about the right one; at angles zero the
 /// optical frame is level and looks forward.
-pub(crate) fn true_chain(random: &mut RandomStream) -> ClassicalChain {
+pub fn true_chain(random: &mut RandomStream) -> ClassicalChain {
     let mut angle = |nominal_deg: f64| (nominal_deg + 2.2 * random.normal().clamp(-2.0, 2.0)).to_radians();
     let quarter = 90.0;
     let offsets = [angle(-quarter), angle(quarter), angle(-quarter)];
@@ -50,19 +50,19 @@ pub(crate) fn true_chain(random: &mut RandomStream) -> ClassicalChain {
 
 /// Commanded orientation of the camera: level roll, varying pitch and heading.
 #[derive(Clone, Debug)]
-pub(crate) struct LookAround {
+pub struct LookAround {
     /// Heading relative to the vehicle's (smoothed) heading, and its amplitude.
-    pub(crate) yaw_rad: [f64; 2],
+    pub yaw_rad: [f64; 2],
     /// Pitch, positive up, and its amplitude.
     pub(crate) pitch_rad: [f64; 2],
     /// Amplitude of the roll about level.
     pub(crate) roll_rad: f64,
     /// Start and duration of back-and-forth swings of the heading at the motors' largest rate.
-    pub(crate) slew_s: Option<[f64; 2]>,
+    pub slew_s: Option<[f64; 2]>,
     /// Joint that is fixed at its angle, start and duration in seconds.
-    pub(crate) fixed_joint: Option<(usize, [f64; 2])>,
+    pub fixed_joint: Option<(usize, [f64; 2])>,
     /// Start and duration of an interval in which the camera keeps its orientation in the world exactly.
-    pub(crate) stabilized_s: Option<[f64; 2]>,
+    pub stabilized_s: Option<[f64; 2]>,
     /// Direction at which the camera points in place of the vehicle's heading.
     pub(crate) aim: Option<Aim>,
     waves: [Wave; 3],
@@ -84,13 +84,13 @@ impl LookAround {
     }
 
     /// Commands of a mirrored flight: the mean heading relative to the vehicle's changes its side.
-    pub(crate) fn mirrored(mut self) -> Self {
+    pub fn mirrored(mut self) -> Self {
         self.yaw_rad[0] = -self.yaw_rad[0];
         self
     }
 
     /// Points at what there is to see, up to 12° to each side of a target.
-    pub(crate) fn aimed(mut self, aim: Aim) -> Self {
+    pub fn aimed(mut self, aim: Aim) -> Self {
         if aim.target_m.is_some() {
             self.yaw_rad = [0.0, 12_f64.to_radians()];
         }
@@ -135,7 +135,7 @@ impl LookAround {
 
 /// Gains and limits of the stabilizing controller.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Stabilizer {
+pub struct Stabilizer {
     /// Commanded rate per radian of orientation error, in 1/s: its inverse is the lag.
     pub(crate) gain_per_s: f64,
     /// Time constant of the joint motors.
@@ -165,7 +165,7 @@ pub struct JointMotion {
 impl JointMotion {
     /// Simulates the gimbal: at every step the controller commands joint rates towards the commanded orientation, and
     /// the motors follow with lag within the joint limits.
-    pub(crate) fn simulate(
+    pub fn simulate(
         trajectory: &Trajectory,
         chain: &ClassicalChain,
         joints: &[Joint],
@@ -213,12 +213,12 @@ impl JointMotion {
     }
 
     /// Motion of a gimbal with three joints that stabilizes its camera.
-    pub(crate) fn stabilized(trajectory: &Trajectory, gimbal: &GimbalRig, look: &LookAround) -> Self {
+    pub fn stabilized(trajectory: &Trajectory, gimbal: &GimbalRig, look: &LookAround) -> Self {
         Self::simulate(trajectory, &gimbal.chain, &gimbal.joints, look, &Stabilizer::default())
     }
 
     /// Joints that follow prescribed angles; `at` returns angle and rate of a joint at a time in seconds.
-    pub(crate) fn prescribed(joints: usize, duration_s: f64, at: impl Fn(usize, f64) -> [f64; 2]) -> Self {
+    pub fn prescribed(joints: usize, duration_s: f64, at: impl Fn(usize, f64) -> [f64; 2]) -> Self {
         let steps = (duration_s / CONTROL_STEP_S).ceil() as usize + 2;
         let states = (0..steps).flat_map(|step| (0..joints).map(move |joint| (joint, step as f64 * CONTROL_STEP_S)));
         Self { joints, states: states.map(|(joint, time_s)| at(joint, time_s)).collect() }

@@ -13,7 +13,7 @@ const FIRST_SAMPLE_S: f64 = 0.0013;
 
 impl Scenario {
     /// Simulates the samples of the IMU on the gimbal, if the rig has one; the joints must have their final motion.
-    pub(crate) fn measure_gimbal_imu(&mut self, noise_scale: f64) {
+    pub fn measure_gimbal_imu(&mut self, noise_scale: f64) {
         let Some(imu) = &self.true_rig.gimbal_imu else { return };
         let rate_hz = imu.sensor.rate_hz;
         let duration_s = self.trajectory.duration_s();
@@ -28,7 +28,7 @@ impl Scenario {
 
     /// Applies errors of the IMU on the gimbal that the given rig does not have: the stamps are `shift_s` before the
     /// measurements, and the axes differ by random rotations of this standard deviation.
-    pub(crate) fn spoil_gimbal_imu(&mut self, [shift_s, axes_rad]: [f64; 2]) {
+    pub fn spoil_gimbal_imu(&mut self, [shift_s, axes_rad]: [f64; 2]) {
         let mut random = RandomStream::new(self.seed, stream::GIMBAL_IMU_AXES);
         if let Some(imu) = &mut self.given_rig.gimbal_imu {
             imu.camera_from_imu.rotation *= so3::exp(&random.normal_vector(axes_rad));

@@ -8,7 +8,7 @@ use crate::geometry::{ns_from_seconds, seconds_from_ns};
 use crate::sensors::{ImuIntrinsics, ImuNoise, ImuSample};
 
 /// Noise of the ADIS16448, the IMU of the paper, with the values of `RotorS`.
-pub(crate) const FIREFLY_IMU: ImuNoise = ImuNoise {
+pub const FIREFLY_IMU: ImuNoise = ImuNoise {
     accelerometer_noise_density: 0.004,
     accelerometer_random_walk: 0.006,
     gyroscope_noise_density: 3.394e-4,
@@ -38,14 +38,14 @@ pub(super) struct ImuMotion {
 
 /// All samples of a flight with their biases.
 #[derive(Clone, Debug)]
-pub(crate) struct ImuRecord {
-    pub(crate) samples: Vec<ImuSample>,
-    pub(crate) biases: Vec<SimulatedBias>,
+pub struct ImuRecord {
+    pub samples: Vec<ImuSample>,
+    pub biases: Vec<SimulatedBias>,
 }
 
 impl ImuRecord {
     /// Simulates the samples of a flight; `noise_scale` 0 gives ideal samples without bias.
-    pub(crate) fn measure(
+    pub fn measure(
         trajectory: &Trajectory,
         noise: &ImuNoise,
         rate_hz: f64,
@@ -101,7 +101,7 @@ impl ImuRecord {
 
     /// Adds a first-order Gauss–Markov error of this stationary standard deviation (m/s²) and time constant to each
     /// axis of the accelerometer; the error is part of the bias.
-    pub(crate) fn drift(&mut self, sigma_m_per_s2: f64, time_constant_s: f64, random: &mut RandomStream) {
+    pub fn drift(&mut self, sigma_m_per_s2: f64, time_constant_s: f64, random: &mut RandomStream) {
         let mut error = random.normal_vector(sigma_m_per_s2);
         let mut before_ns = None;
         for (sample, bias) in self.samples.iter_mut().zip(&mut self.biases) {

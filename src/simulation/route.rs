@@ -8,19 +8,19 @@ use crate::geometry::{smooth_step, wrap_angle};
 
 /// Reference position and heading of a flight at one time.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct FlightPoint {
+pub struct FlightPoint {
     /// Position in the world.
-    pub(crate) position_m: Vector3<f64>,
+    pub position_m: Vector3<f64>,
     /// Standard deviation of the random manoeuvres, per axis of the world.
     pub(crate) position_wander_m: Vector3<f64>,
     /// Heading, continuous over time.
-    pub(crate) heading_rad: f64,
+    pub heading_rad: f64,
     /// Standard deviation of the random manoeuvres in heading.
     pub(crate) heading_wander_rad: f64,
 }
 
 /// Reference of a trajectory, without its random manoeuvres.
-pub(crate) trait Flight {
+pub trait Flight {
     /// Time between two manoeuvres, in seconds.
     fn knot_s(&self) -> f64 {
         0.65
@@ -31,7 +31,7 @@ pub(crate) trait Flight {
 }
 
 /// Flight mirrored at the x–z plane: an orbit to the left becomes one to the right.
-pub(crate) struct Mirrored(pub(crate) Box<dyn Flight>);
+pub struct Mirrored(pub Box<dyn Flight>);
 
 impl Flight for Mirrored {
     fn knot_s(&self) -> f64 {

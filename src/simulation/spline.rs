@@ -8,9 +8,9 @@ const DEGREE: usize = 5;
 /// Control point `c` has its largest weight at the time `(c − 2) · knot_s`; equal control points give an exact
 /// standstill.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Spline<const D: usize> {
-    pub(crate) knot_s: f64,
-    pub(crate) points: Vec<SVector<f64, D>>,
+pub struct Spline<const D: usize> {
+    pub knot_s: f64,
+    pub points: Vec<SVector<f64, D>>,
 }
 
 /// Weights of the `degree + 1` control points that affect `u ∈ [0, 1]` of a knot interval.
@@ -46,7 +46,7 @@ impl<const D: usize> Spline<D> {
     }
 
     /// Derivative of order `order` (0 to 4) at a time; the ends are extrapolated as polynomials.
-    pub(crate) fn derivative(&self, time_s: f64, order: usize) -> SVector<f64, D> {
+    pub fn derivative(&self, time_s: f64, order: usize) -> SVector<f64, D> {
         let first = self.first_acting(time_s);
         let mut acting = [SVector::<f64, D>::zeros(); DEGREE + 1];
         for (slot, point) in acting.iter_mut().zip(&self.points[first..]) {

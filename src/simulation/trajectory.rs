@@ -66,14 +66,14 @@ pub struct Trajectory {
 }
 
 /// Drag of the air over mass and velocity, in 1/s.
-pub(crate) const AIR_DRAG_PER_S: f64 = 0.15;
+pub const AIR_DRAG_PER_S: f64 = 0.15;
 
 /// Time step at which limits are checked and lengths are summed, in seconds.
 const CHECK_STEP_S: f64 = 0.02;
 
 impl Trajectory {
     /// Follows `flight` with random manoeuvres for `duration_s` seconds; manoeuvres that exceed `limits` are reduced.
-    pub(crate) fn new(
+    pub fn new(
         flight: &dyn Flight,
         random: &mut RandomStream,
         limits: &VehicleLimits,
@@ -103,12 +103,7 @@ impl Trajectory {
     }
 
     /// Flight along these splines.
-    pub(super) fn of_splines(
-        position_m: Spline<3>,
-        heading_rad: Spline<1>,
-        gravity_m_per_s2: f64,
-        duration_s: f64,
-    ) -> Self {
+    pub fn of_splines(position_m: Spline<3>, heading_rad: Spline<1>, gravity_m_per_s2: f64, duration_s: f64) -> Self {
         Self { position_m, heading_rad, gravity_m_per_s2, duration_s }
     }
 
@@ -140,7 +135,7 @@ impl Trajectory {
     }
 
     /// Adds a rotation about the vertical over an interval of start and length in seconds.
-    pub(crate) fn spin(&mut self, [start_s, length_s]: [f64; 2], rate_rad_per_s: f64) {
+    pub fn spin(&mut self, [start_s, length_s]: [f64; 2], rate_rad_per_s: f64) {
         for index in 0..self.heading_rad.points.len() {
             let time_s = self.heading_rad.time_of_point(index);
             self.heading_rad.points[index].x += rate_rad_per_s * (time_s - start_s).clamp(0.0, length_s.max(0.0));
@@ -152,7 +147,7 @@ impl Trajectory {
     ///
     /// A spline extends three knots to each side of its points, so the vehicle decelerates before and is stationary
     /// after.
-    pub(crate) fn hover(&mut self, [start_s, length_s]: [f64; 2]) {
+    pub fn hover(&mut self, [start_s, length_s]: [f64; 2]) {
         const SWAY_M: f64 = 0.01;
         const REACH: usize = 6;
         let count = self.position_m.points.len();
@@ -228,7 +223,7 @@ impl Trajectory {
     }
 
     /// Time in seconds at which the path has this length, at most the duration; a multiple of 0.05 s.
-    pub(crate) fn time_of_length(&self, length_m: f64) -> f64 {
+    pub fn time_of_length(&self, length_m: f64) -> f64 {
         const STEP_S: f64 = 0.05;
         let mut length = 0.0;
         let mut step = 0_u32;
@@ -240,7 +235,7 @@ impl Trajectory {
     }
 
     /// Ends the flight earlier.
-    pub(crate) fn cut(mut self, duration_s: f64) -> Self {
+    pub fn cut(mut self, duration_s: f64) -> Self {
         self.duration_s = self.duration_s.min(duration_s);
         self
     }
@@ -251,7 +246,7 @@ impl VehicleLimits {
     ///
     /// # Errors
     /// The first time at which the flight exceeds a limit, with the value there.
-    pub(super) fn admit_flight(&self, trajectory: &Trajectory) -> Result<(), String> {
+    pub fn admit_flight(&self, trajectory: &Trajectory) -> Result<(), String> {
         let steps = (trajectory.duration_s / CHECK_STEP_S).floor() as usize;
         let mut times_s = (0..=steps).map(|step| step as f64 * CHECK_STEP_S);
         let exceeded = |time_s: f64| {

@@ -104,7 +104,7 @@ impl Rotor {
 }
 
 /// Adds the ripple of the gimbal's servos to all samples, which no filter precedes.
-pub(super) fn ripple(record: &mut ImuRecord, vibration: &Vibration, random: &mut RandomStream) {
+pub fn ripple(record: &mut ImuRecord, vibration: &Vibration, random: &mut RandomStream) {
     let mut servos: Vec<Rotor> = (0..SERVOS).map(|_| Rotor::new(vibration, SERVOS, &RIPPLE, random)).collect();
     let mut last_s = 0.0;
     for sample in &mut record.samples {
@@ -120,7 +120,7 @@ pub(super) fn ripple(record: &mut ImuRecord, vibration: &Vibration, random: &mut
 }
 
 /// Adds the vibration to all samples of a flight.
-pub(super) fn shake(record: &mut ImuRecord, trajectory: &Trajectory, vibration: &Vibration, random: &mut RandomStream) {
+pub fn shake(record: &mut ImuRecord, trajectory: &Trajectory, vibration: &Vibration, random: &mut RandomStream) {
     let mut rotors: Vec<Rotor> = (0..ROTORS).map(|_| Rotor::new(vibration, ROTORS, &HARMONICS, random)).collect();
     let gravity = trajectory.gravity_m_per_s2();
     let (mut airborne, mut speed_ratio, mut last_s) = (false, IDLE_RATIO, 0.0);

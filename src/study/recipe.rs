@@ -3,7 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::sensors::ChainPrior;
-use crate::simulation::{Experiment, Lens, SimulationError, SimulationOptions, WorldKind};
+use crate::simulated_log::{SimulationError, SimulationOptions};
+use crate::simulation::{Experiment, Lens, WorldKind};
 use crate::text::Named as _;
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -1,5 +1,7 @@
 //! One job: the estimator on its log with its rig, and the rows of its result.
 
+use crate::files::RigFile as _;
+use crate::flight_log::RigOfLog as _;
 use std::fs;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};

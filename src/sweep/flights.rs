@@ -11,7 +11,7 @@ use super::folder::StudyFolder;
 use super::inputs::file_sha256;
 use crate::files::output;
 use crate::session::Stopwatch;
-use crate::simulation::{SimulationError, SimulationProgress, simulate_interruptible};
+use crate::simulated_log::{SimulationError, SimulationProgress, simulate_interruptible};
 use crate::study::SimulatedFlight;
 
 /// File with the metadata of a rendered flight.

@@ -1,5 +1,7 @@
 //! Inputs of a study: the plan, its logs and the hashes of their content.
 
+use crate::files::RigFile as _;
+use crate::flight_log::RigOfLog as _;
 use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::Read as _;

@@ -264,8 +264,7 @@ pub fn distinct<Item: PartialEq>(items: impl IntoIterator<Item = Item>) -> Vec<I
 }
 
 /// Table of a document; columns without a meaning are left out.
-#[cfg(test)]
-pub(crate) fn documented<Row>(columns: &[Column<'_, Row>]) -> String {
+pub fn documented<Row>(columns: &[Column<'_, Row>]) -> String {
     let row = |column: &Column<'_, Row>| {
         let Column { name, unit, meaning, cell_type, .. } = column;
         format!("| `{name}` | {} | {unit} | {meaning} |\n", cell_type.name())

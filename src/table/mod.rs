@@ -6,16 +6,13 @@
 mod alignment;
 mod cell;
 mod column;
-#[cfg(feature = "logs")]
 mod csv;
 mod number;
 pub mod text;
 
 pub use self::alignment::align_numbers;
 pub use self::cell::{Cell, CellValue, ColumnType, Stamp};
-#[cfg(test)]
-pub(crate) use self::column::documented;
+pub use self::column::documented;
 pub use self::column::{Column, Direction, Style, Tone, distinct};
-#[cfg(feature = "logs")]
 pub use self::csv::{csv, csv_text};
 pub use self::number::{Medium, Shown, fixed, significant};

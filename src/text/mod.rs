@@ -1,7 +1,6 @@
 //! Texts that people write and read: `KEY=VALUE` entries, tables of keys, conditions, names of enums, command lines.
 
-#[cfg(feature = "logs")]
-pub(crate) mod condition;
+pub mod condition;
 mod entry;
 mod keys;
 mod named;
@@ -11,8 +10,7 @@ mod utc;
 pub use entry::{Entry, FINITE, items, numbers};
 pub use keys::{Field, Key, Label, Numbers, key_list, read_entry, read_item, written_items};
 pub use named::Named;
-#[cfg(feature = "logs")]
-pub(crate) use printable::without_bom;
+pub use printable::without_bom;
 pub use printable::{
     command_line, counted, edit_distance, log_name, nearest_name, printable, printable_lines, shortened,
     without_signed_zeros,

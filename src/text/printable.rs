@@ -37,8 +37,7 @@ fn escaped(text: &str, keeps: impl Fn(char) -> bool) -> Cow<'_, str> {
 }
 
 /// Text without the byte order mark that some editors and spreadsheets write at its start.
-#[cfg(feature = "logs")]
-pub(crate) fn without_bom(text: &str) -> &str {
+pub fn without_bom(text: &str) -> &str {
     text.strip_prefix('\u{feff}').unwrap_or(text)
 }
 

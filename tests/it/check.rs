@@ -4,10 +4,12 @@ use std::path::Path;
 use std::sync::Arc;
 
 use dcvins::flight_log::FlightLog;
+use dcvins::flight_log::RigOfLog as _;
 use dcvins::log_check::{CheckReport, Finding, ImageRotation, Severity, check};
 use dcvins::sensors::{CameraMount, Rig};
 use dcvins::session::image_rotations;
-use dcvins::simulation::{Experiment, SimulationOptions, simulate};
+use dcvins::simulated_log::{SimulationOptions, simulate};
+use dcvins::simulation::Experiment;
 use tempfile::TempDir;
 
 /// A log with the rotations of its cameras.

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use dcvins::session::{ForkChanges, ParameterizationChoice, RunSpec};
-use dcvins::simulation::Disturbances;
+use dcvins::simulated_log::Disturbances;
 use dcvins::text::Named as _;
 
 const DOCUMENT: &str = "docs/mathematics.md";

@@ -5,6 +5,11 @@ use std::fs;
 use std::path::Path;
 use std::sync::LazyLock;
 
+/// Roots of the program and of the crates that [`dcvins`] re-exports.
+pub(crate) const ROOTS: [&str; 3] = ["estimation.rs", "logs.rs", "main.rs"];
+/// Folder whose paths from `crate` begin in itself; the other crates of `src` re-export each other at their roots.
+const OWN_CRATE: &str = "painting";
+
 /// Path of a module below the crate's root, outermost name first.
 type ModulePath = Vec<String>;
 
@@ -83,7 +88,8 @@ impl Imports {
     /// All files below `src` but `main.rs` and the files of tests, read once.
     pub(crate) fn read() -> &'static Self {
         static IMPORTS: LazyLock<Imports> = LazyLock::new(|| {
-            let library = source_files().into_iter().filter(|(name, _)| name != "main.rs" && !is_test_file(name));
+            let library =
+                source_files().into_iter().filter(|(name, _)| !ROOTS.contains(&name.as_str()) && !is_test_file(name));
             Imports::of(library.collect())
         });
         &IMPORTS
@@ -206,6 +212,9 @@ impl Imports {
         let (first, rest) = path.split_first()?;
         let module = &self.files[from].module;
         match first.as_str() {
+            "crate" if module.first().is_some_and(|folder| folder == OWN_CRATE) => {
+                self.walk(*self.modules.get(&vec![OWN_CRATE.to_owned()])?, rest, depth)
+            }
             "crate" | "dcvins" => self.walk(*self.modules.get(&Vec::new())?, rest, depth),
             "self" if rest.first().is_some_and(|next| next == "super") => self.resolve(from, rest, depth),
             "self" => self.walk(from, rest, depth),

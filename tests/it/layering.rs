@@ -1,9 +1,9 @@
 //! The one-way order of the folders of `src/` and of the files in them, read from their imports.
 
-use super::imports::{Imports, is_test_file, source_files};
+use super::imports::{Imports, ROOTS, is_test_file, source_files};
 
 /// Folders from the first to the last; each may use those before it. The table in `src/lib.rs` says what each promises.
-const ORDER: [&str; 26] = [
+const ORDER: [&str; 28] = [
     "text",
     "geometry",
     "table",
@@ -16,12 +16,14 @@ const ORDER: [&str; 26] = [
     "flight_log",
     "frontend",
     "simulation",
+    "simulated_log",
     "estimator",
     "observability",
     "calibration",
     "log_check",
     "session",
     "study",
+    "painting",
     "gui",
     "export",
     "interop",
@@ -45,8 +47,8 @@ const UNKNOWN_TO: [(&str, &[&str]); 6] = [
 /// The only folders that may open, read or write files.
 const FILE_SYSTEM: [&str; 8] = ["files", "flight_log", "export", "interop", "report", "sweep", "desktop", "cli"];
 
-/// The only folders that may name the crates of the window; `export` draws its panels.
-const WINDOW: [&str; 3] = ["gui", "export", "cli"];
+/// The only folders that may name the crates of the window; `painting` paints its frames, `export` draws its panels.
+const WINDOW: [&str; 4] = ["painting", "gui", "export", "cli"];
 
 /// Circles between the files and subfolders of one folder that are still there, as `folder: child child …`.
 const KNOWN_CIRCLES: &[&str] = &[];
@@ -73,7 +75,7 @@ const MUST_NOT_IMPORT: &[(&str, &[&str])] = &[
     ("observability/analysis", &["estimator/estimator", "estimator/window", "estimator/report", "estimator/factors"]),
     ("observability", &["estimator/estimator", "estimator/start"]),
     // Runs no estimator.
-    ("log_check", &["estimator", "observability", "calibration", "simulation"]),
+    ("log_check", &["estimator", "observability", "calibration", "simulation", "simulated_log"]),
     ("session/plan", &["session/record", "session/engine", "session/diagnosis", "session/playback"]),
     ("session/misfit", &["session/record", "session/engine", "session/diagnosis", "session/playback"]),
     // No thread and no estimator.
@@ -98,6 +100,7 @@ const MUST_NOT_NAME: &[(&str, &[&str])] = &[
     ("session/record/", &["std::thread", "thread::spawn", "Mutex", "channel("]),
     ("estimator/", &["std::thread", "Instant::now", "SystemTime"]),
     ("simulation/", &["Instant::now", "SystemTime"]),
+    ("simulated_log/", &["Instant::now", "SystemTime"]),
 ];
 
 /// One source file: the folder it belongs to and its text without comments.
@@ -108,6 +111,11 @@ struct Source {
     text: String,
     /// True if it contains tests only.
     test: bool,
+}
+
+/// True for the root of a crate, which declares or re-exports folders.
+fn is_root(source: &Source) -> bool {
+    source.name == "lib.rs" || ROOTS.contains(&source.name.as_str()) && source.name != "main.rs"
 }
 
 fn sources() -> Vec<Source> {
@@ -204,7 +212,7 @@ fn groups_of_imports_are_read() {
 #[test]
 fn every_folder_has_its_place_in_the_order() {
     let sources = sources();
-    let placed = |source: &Source| source.folder == "lib" || position(&source.folder).is_some();
+    let placed = |source: &Source| is_root(source) || position(&source.folder).is_some();
     let violations: Vec<String> =
         sources.iter().filter(|source| !placed(source)).map(|source| source.name.clone()).collect();
     fail_on(&violations);
@@ -213,7 +221,7 @@ fn every_folder_has_its_place_in_the_order() {
 #[test]
 fn imports_point_one_way() {
     let mut violations = Vec::new();
-    for source in sources().iter().filter(|source| !source.test && source.folder != "lib") {
+    for source in sources().iter().filter(|source| !source.test && !is_root(source)) {
         let own = position(&source.folder).unwrap();
         for name in named_folders(&source.text) {
             if position(&name).is_some_and(|other| other > own) {
@@ -231,7 +239,7 @@ fn imports_point_one_way() {
 #[test]
 fn only_some_folders_name_the_window_and_the_file_system() {
     let mut violations = Vec::new();
-    for source in sources().iter().filter(|source| !source.test && source.folder != "lib") {
+    for source in sources().iter().filter(|source| !source.test && !is_root(source)) {
         let mut only_in = |folders: &[&str], words: &[&str]| {
             let named = words.iter().find(|word| source.text.contains(**word));
             if let Some(word) = named.filter(|_| !folders.contains(&source.folder.as_str())) {
@@ -335,15 +343,17 @@ fn every_source_file_is_declared_by_its_parent() {
     let declared = |name: &str| {
         let path = name.strip_suffix("/mod.rs").or_else(|| name.strip_suffix(".rs")).expect("it is a Rust file");
         let (parents, module) = match path.rsplit_once('/') {
-            Some((parent, module)) => ([format!("{parent}.rs"), format!("{parent}/mod.rs")], module),
-            None => (["lib.rs", "main.rs"].map(str::to_owned), path),
+            Some((parent, module)) => {
+                (vec![format!("{parent}.rs"), format!("{parent}/mod.rs"), format!("{parent}/lib.rs")], module)
+            }
+            None => (["lib.rs"].into_iter().chain(ROOTS).map(str::to_owned).collect(), path),
         };
         parents.iter().filter_map(|parent| text_of(parent)).any(|text| text.contains(&format!("mod {module};")))
     };
     let orphans: Vec<String> = files
         .iter()
         .map(|(name, _)| name.clone())
-        .filter(|name| !["lib.rs", "main.rs"].contains(&name.as_str()) && !declared(name))
+        .filter(|name| !name.ends_with("lib.rs") && !ROOTS.contains(&name.as_str()) && !declared(name))
         .collect();
     fail_on(&orphans);
 }

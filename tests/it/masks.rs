@@ -4,7 +4,9 @@ use std::path::Path;
 use std::process::Command;
 
 use dcvins::camera::CameraModel;
+use dcvins::files::RigFile as _;
 use dcvins::flight_log::FlightLog;
+use dcvins::flight_log::RigOfLog as _;
 use dcvins::sensors::Rig;
 
 fn dcvins(arguments: &[&str]) -> (i32, String) {

@@ -4,6 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use dcvins::files::RigFile as _;
 use dcvins::files::urdf::{CameraAxes, RobotModel};
 use dcvins::sensors::Rig;
 use dcvins::session::{Session, SessionRequest};

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use dcvins::files::RigFile as _;
 use dcvins::sensors::{CameraMount, Rig};
 use serde_json::Value;
 

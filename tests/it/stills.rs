@@ -4,6 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use dcvins::files::RigFile as _;
 use dcvins::sensors::{Rig, StillCamera, StillView, Stills};
 use dcvins::simulation::{SyntheticStills, SyntheticStillsOptions, synthetic_stills};
 use serde_json::{Value, json};

@@ -227,7 +227,7 @@ impl EstimatorConfig {
 
     /// Other camera of the stereo pair of a camera, by its number; `None` without one. Both images have as many blocks, and
     /// the intrinsics are fixed.
-    pub(crate) fn partner(&self, camera: usize) -> Option<usize> {
+    pub fn partner(&self, camera: usize) -> Option<usize> {
         let is_rolling = |camera: usize| self.sensor(camera).readout_s != 0.0;
         let is_partner = |further: &FurtherCamera| further.is_matched && further.base == Some(camera);
         let partner = self.further_cameras.iter().position(is_partner)? + 1;
@@ -236,7 +236,7 @@ impl EstimatorConfig {
     }
 
     /// Standard deviation of an encoder reading in radians, `None` if encoders are absent or unused.
-    pub(crate) fn encoder_in_use(&self) -> Option<f64> {
+    pub fn encoder_in_use(&self) -> Option<f64> {
         self.encoder_sigma_rad.filter(|_| self.use_encoder)
     }
 }

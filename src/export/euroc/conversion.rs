@@ -1,5 +1,6 @@
 //! Writing of all sensors of a log into an unfinished folder, each table row by row.
 
+use crate::files::RigFile as _;
 use std::fs::{self, File};
 use std::io::BufWriter;
 use std::ops::ControlFlow;

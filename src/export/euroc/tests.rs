@@ -4,11 +4,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::{EurocReport, check_euroc_folder, write_euroc};
+use crate::flight_log::RigOfLog as _;
 use crate::flight_log::convert::convert;
 use crate::flight_log::{FlightLog, ground_truth_poses, imu_samples, joint_samples, recorded_images};
 use crate::gimbal::ClassicalChain;
 use crate::sensors::{CameraMount, ImuSample, JointSample, PoseSample, Rig};
-use crate::simulation::{Experiment, SimulationOptions, simulate};
+use crate::simulated_log::{SimulationOptions, simulate};
+use crate::simulation::Experiment;
 
 /// Short flight with both cameras, and its rig.
 fn flight(folder: &Path) -> (Arc<FlightLog>, Rig) {

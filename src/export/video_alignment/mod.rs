@@ -2,6 +2,7 @@
 
 mod plot;
 
+use crate::flight_log::RigOfLog as _;
 use std::fmt;
 use std::io;
 use std::ops::ControlFlow;

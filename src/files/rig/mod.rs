@@ -19,19 +19,51 @@ use self::camera_facts::{CameraFacts, NoFacts};
 pub(crate) use self::document::Document;
 use self::mask::InFolder;
 use super::FileError;
+use super::output::StagedFile;
 use crate::sensors::Rig;
 
-impl Rig {
+/// Rig files of the schema of this program.
+pub trait RigFile: Sized {
     /// Reads a rig file: the schema of this program, or Kalibr's `camchain-imucam.yaml` with `imu.yaml` in the same
     /// folder.
-    pub fn from_file(path: &Path) -> Result<Self, FileError> {
+    fn from_file(path: &Path) -> Result<Self, FileError>;
+
+    /// Parses the text of a rig in the schema of this program; `file` is named in errors.
+    fn from_yaml(text: &str, file: &Path) -> Result<Self, FileError>;
+
+    /// Returns the rig as a YAML file, with its chain in the classical parameterization. Numbers read back exactly;
+    /// rotation matrices read back to within rounding.
+    fn to_yaml(&self) -> String;
+
+    /// Writes the rig as YAML, with `appended` (further top-level entries, or nothing) at its end.
+    fn save(&self, path: &Path, appended: &str) -> Result<(), FileError> {
+        let staged = self.stage(path, appended)?;
+        staged.commit().map_err(|source| FileError::Io { action: "write the rig", source, path: path.to_owned() })
+    }
+
+    /// [`Self::save`] without the final rename, so that the file can appear together with others.
+    fn stage(&self, path: &Path, appended: &str) -> Result<StagedFile, FileError> {
+        let text = format!("{}{appended}", self.to_yaml());
+        StagedFile::with_content(path, text.as_bytes()).map_err(|source| FileError::Io {
+            action: "write the rig",
+            source,
+            path: path.to_owned(),
+        })
+    }
+}
+
+impl RigFile for Rig {
+    fn from_file(path: &Path) -> Result<Self, FileError> {
         from_file(path, &NoFacts).map(|(rig, _)| rig)
     }
 
-    /// Parses the text of a rig in the schema of this program; `file` is named in errors.
-    pub fn from_yaml(text: &str, file: &Path) -> Result<Self, FileError> {
+    fn from_yaml(text: &str, file: &Path) -> Result<Self, FileError> {
         let facts = InFolder { facts: &NoFacts, folder: folder_of(file) };
         from_document(&Document::parse(text, file)?, &facts).map(|(rig, _)| rig)
+    }
+
+    fn to_yaml(&self) -> String {
+        write::yaml(self)
     }
 }
 

@@ -3,6 +3,8 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 
+use crate::files::RigFile as _;
+use crate::flight_log::RigOfLog as _;
 use crate::flight_log::tests::RIG;
 use crate::flight_log::{FlightLog, LogWriter, LogWriterOptions, MessageTimes};
 use crate::sensors::{AttitudeMessage, AttitudeSource, CameraMount, IntrinsicsSigma, Rig};

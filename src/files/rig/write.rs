@@ -1,11 +1,8 @@
 use std::fmt::Write as _;
-use std::path::Path;
 
 use nalgebra::SMatrix;
 
 use super::attitude;
-use crate::files::FileError;
-use crate::files::output::StagedFile;
 use crate::files::yaml::{number, numbers, text};
 use crate::geometry::RigidTransform;
 use crate::gimbal::DhLink;
@@ -14,77 +11,59 @@ use crate::sensors::{
     RequiredAccuracy, Rig,
 };
 
-impl Rig {
-    /// Writes the rig as YAML, with `appended` (further top-level entries, or nothing) at its end.
-    pub fn save(&self, path: &Path, appended: &str) -> Result<(), FileError> {
-        let staged = self.stage(path, appended)?;
-        staged.commit().map_err(|source| FileError::Io { action: "write the rig", source, path: path.to_owned() })
+/// A rig as a YAML file, with its chain in the classical parameterization. Numbers read back exactly;
+/// rotation matrices read back to within rounding.
+pub(super) fn yaml(rig: &Rig) -> String {
+    let mut out = String::from("# T_a_b maps points from b to a; metres, radians, seconds.\n");
+    line(&mut out, 0, "rig_version", "1");
+    line(&mut out, 0, "name", &text(&rig.name));
+    line(&mut out, 0, "gravity", &number(rig.gravity_m_per_s2));
+    line(&mut out, 0, "imu0", "");
+    write_imu(&mut out, &rig.imu);
+    if let Some(GimbalImuRig { sensor, camera_from_imu, timeshift_s }) = &rig.gimbal_imu {
+        line(&mut out, 0, "imu1", "");
+        line(&mut out, 1, "mount", "gimbal");
+        write_imu(&mut out, sensor);
+        if *timeshift_s != 0.0 {
+            line(&mut out, 1, "timeshift_imu1_imu", &number(*timeshift_s));
+        }
+        write_transform(&mut out, 1, "T_cam_imu", camera_from_imu);
     }
-
-    /// [`Self::save`] without the final rename, so that the file can appear together with others.
-    pub(crate) fn stage(&self, path: &Path, appended: &str) -> Result<StagedFile, FileError> {
-        let text = format!("{}{appended}", self.to_yaml());
-        StagedFile::with_content(path, text.as_bytes()).map_err(|source| FileError::Io {
-            action: "write the rig",
-            source,
-            path: path.to_owned(),
-        })
+    for camera in &rig.cameras {
+        write_camera(&mut out, rig, camera);
     }
-
-    /// Returns the rig as a YAML file, with its chain in the classical parameterization. Numbers read back exactly;
-    /// rotation matrices read back to within rounding.
-    pub fn to_yaml(&self) -> String {
-        let mut out = String::from("# T_a_b maps points from b to a; metres, radians, seconds.\n");
-        line(&mut out, 0, "rig_version", "1");
-        line(&mut out, 0, "name", &text(&self.name));
-        line(&mut out, 0, "gravity", &number(self.gravity_m_per_s2));
-        line(&mut out, 0, "imu0", "");
-        write_imu(&mut out, &self.imu);
-        if let Some(GimbalImuRig { sensor, camera_from_imu, timeshift_s }) = &self.gimbal_imu {
-            line(&mut out, 0, "imu1", "");
-            line(&mut out, 1, "mount", "gimbal");
-            write_imu(&mut out, sensor);
-            if *timeshift_s != 0.0 {
-                line(&mut out, 1, "timeshift_imu1_imu", &number(*timeshift_s));
-            }
-            write_transform(&mut out, 1, "T_cam_imu", camera_from_imu);
-        }
-        for camera in &self.cameras {
-            write_camera(&mut out, self, camera);
-        }
-        if let Some(gimbal) = &self.gimbal {
-            write_gimbal(&mut out, gimbal);
-        }
-        if self.ground_truth_topic.is_some() || self.ground_truth_lever_arm.is_some() {
-            line(&mut out, 0, "ground_truth", "");
-        }
-        if let Some(topic) = &self.ground_truth_topic {
-            line(&mut out, 1, "rostopic", &text(topic));
-            log_time(&mut out, self.ground_truth_use_log_time);
-        }
-        match &self.ground_truth_lever_arm {
-            Some(LeverArm::Known(position_m)) => line(&mut out, 1, "lever_arm", &numbers(position_m.as_slice())),
-            Some(LeverArm::Estimated) => line(&mut out, 1, "lever_arm", "estimate"),
-            None => {}
-        }
-        if self.required_accuracy != RequiredAccuracy::default() {
-            let RequiredAccuracy { translation_m, rotation_rad, parameters } = &self.required_accuracy;
-            let names = self.parameter_names();
-            line(&mut out, 0, "required_accuracy", "");
-            line(&mut out, 1, "translation", &number(*translation_m));
-            line(&mut out, 1, "rotation", &number(*rotation_rad));
-            for (parameter, sigma) in parameters {
-                line(&mut out, 1, &text(&names.name(*parameter)), &number(*sigma));
-            }
-        }
-        if !self.assumed.is_empty() {
-            line(&mut out, 0, "assumed", "");
-        }
-        for AssumedField { field, reason } in &self.assumed {
-            line(&mut out, 1, &text(field), &text(reason));
-        }
-        out
+    if let Some(gimbal) = &rig.gimbal {
+        write_gimbal(&mut out, gimbal);
     }
+    if rig.ground_truth_topic.is_some() || rig.ground_truth_lever_arm.is_some() {
+        line(&mut out, 0, "ground_truth", "");
+    }
+    if let Some(topic) = &rig.ground_truth_topic {
+        line(&mut out, 1, "rostopic", &text(topic));
+        log_time(&mut out, rig.ground_truth_use_log_time);
+    }
+    match &rig.ground_truth_lever_arm {
+        Some(LeverArm::Known(position_m)) => line(&mut out, 1, "lever_arm", &numbers(position_m.as_slice())),
+        Some(LeverArm::Estimated) => line(&mut out, 1, "lever_arm", "estimate"),
+        None => {}
+    }
+    if rig.required_accuracy != RequiredAccuracy::default() {
+        let RequiredAccuracy { translation_m, rotation_rad, parameters } = &rig.required_accuracy;
+        let names = rig.parameter_names();
+        line(&mut out, 0, "required_accuracy", "");
+        line(&mut out, 1, "translation", &number(*translation_m));
+        line(&mut out, 1, "rotation", &number(*rotation_rad));
+        for (parameter, sigma) in parameters {
+            line(&mut out, 1, &text(&names.name(*parameter)), &number(*sigma));
+        }
+    }
+    if !rig.assumed.is_empty() {
+        line(&mut out, 0, "assumed", "");
+    }
+    for AssumedField { field, reason } in &rig.assumed {
+        line(&mut out, 1, &text(field), &text(reason));
+    }
+    out
 }
 
 /// Writes topic, rate, noise and intrinsics of an IMU.

@@ -1,5 +1,6 @@
 //! Chains of stills: in a stills file, in a JSON file of their own, or in a rig.
 
+use crate::files::RigFile as _;
 use std::collections::BTreeMap;
 use std::path::Path;
 

@@ -25,7 +25,7 @@ const MECHANISMS: [(&str, &str, &str, &[&str]); 3] = [
 const EXACT: f64 = 1e-12;
 
 fn mechanism(name: &str) -> RobotModel {
-    RobotModel::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/urdf").join(name)).unwrap()
+    RobotModel::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/urdf").join(name)).unwrap()
 }
 
 fn parse(text: &str) -> Result<RobotModel, String> {

@@ -16,7 +16,7 @@ const UNPACK_BYTES: usize = 1 << 20;
 
 /// Bytes of a log, read from the file on demand: a file that another process shortens gives an error.
 #[derive(Debug)]
-pub(crate) struct LogFile {
+pub struct LogFile {
     file: File,
     /// In bytes, when the file was opened, or when a log that is being written was looked at last.
     length: AtomicUsize,
@@ -55,7 +55,7 @@ impl LogFile {
     }
 
     /// Length in bytes when the file was opened, or looked at last.
-    pub(crate) fn len(&self) -> usize {
+    pub fn len(&self) -> usize {
         self.length.load(Ordering::Acquire)
     }
 
@@ -66,12 +66,12 @@ impl LogFile {
     }
 
     /// Limits that apply to reading the file.
-    pub(crate) fn limits(&self) -> &LogLimits {
+    pub fn limits(&self) -> &LogLimits {
         &self.limits
     }
 
     /// Reads a range of bytes, at most the size of a record; the error is a description of the problem.
-    pub(crate) fn read(&self, range: Range<usize>) -> Result<Vec<u8>, String> {
+    pub fn read(&self, range: Range<usize>) -> Result<Vec<u8>, String> {
         let length = range.end.saturating_sub(range.start);
         if range.end > self.len() {
             return Err(format!("bytes {} to {} of a file of {}", range.start, range.end, self.len()));

@@ -1,6 +1,7 @@
 //! Rig of a EuRoC folder: its `sensor.yaml` files with Kalibr's names, and the rig that this program writes inside a
 //! folder for all that they cannot describe.
 
+use crate::files::RigFile as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 

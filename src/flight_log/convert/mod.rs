@@ -21,6 +21,7 @@ mod source_file;
 mod source_kind;
 mod sqlite;
 
+use crate::files::RigFile as _;
 use std::fs;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};

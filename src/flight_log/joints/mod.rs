@@ -1,7 +1,7 @@
 //! Merges messages with some of the joints to samples of all joints: several drivers can publish on one topic, one
 //! joint each.
 
-pub(crate) mod attitude;
+pub mod attitude;
 
 use std::collections::VecDeque;
 

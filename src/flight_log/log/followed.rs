@@ -125,12 +125,13 @@ mod tests {
     use std::time::Duration;
 
     use super::*;
+    use crate::files::RigFile as _;
     use crate::flight_log::MessageKind;
 
     const IMPATIENT: Patience = Patience { idle_polls: 10, stopped_ns: 2_000_000_000 };
 
     fn sample() -> Vec<u8> {
-        fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/sample_logs/garden.mcap")).unwrap()
+        fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../../sample_logs/garden.mcap")).unwrap()
     }
 
     /// Log times of the messages of the IMU, waiting for those that are not written yet.

@@ -149,12 +149,7 @@ impl FlightLog {
     }
 
     /// Returns the topic of a rig field, if the log has it with one of these types.
-    pub(crate) fn require_topic(
-        &self,
-        field: &str,
-        topic: &str,
-        kinds: &[MessageKind],
-    ) -> Result<&TopicInfo, LogError> {
+    pub fn require_topic(&self, field: &str, topic: &str, kinds: &[MessageKind]) -> Result<&TopicInfo, LogError> {
         let (field, path) = (field.to_owned(), self.path.clone());
         let expected = || kinds.iter().map(|kind| kind.schema_name()).collect::<Vec<_>>().join(" or ");
         match self.topic(topic) {
@@ -218,7 +213,7 @@ impl FlightLog {
         self.file.require_unshortened(&self.path)
     }
 
-    pub(crate) fn file(&self) -> &LogFile {
+    pub fn file(&self) -> &LogFile {
         &self.file
     }
 

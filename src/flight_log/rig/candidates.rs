@@ -1,5 +1,6 @@
 //! Rigs that a log without one may belong to, and the sensors that a log lacks for any rig.
 
+use crate::flight_log::RigOfLog as _;
 use std::path::{Path, PathBuf};
 
 use super::super::{FlightLog, MessageKind};

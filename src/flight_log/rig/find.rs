@@ -6,26 +6,18 @@ use crate::files::rig::camera_facts::{CameraFacts, PublishedCamera};
 use crate::files::rig::{Document, RigWithUnusedKeys, from_document, from_file};
 use crate::sensors::Rig;
 
-impl Rig {
+/// The rig of a log.
+pub trait RigOfLog: Sized {
     /// Finds the rig of a log: the file given by the user, else the one next to the log, else the one attached to it.
     /// Missing intrinsics and image rates are taken from the log.
-    pub fn for_log(log: &FlightLog, explicit: Option<&Path>) -> Result<Self, LogError> {
-        Self::for_log_with_unused_keys(log, explicit).map(|(rig, _)| rig)
-    }
+    fn for_log(log: &FlightLog, explicit: Option<&Path>) -> Result<Self, LogError>;
 
     /// Returns the rig of [`Self::for_log`], with the paths of the keys in its file that other programs write and that
     /// are not used.
-    pub fn for_log_with_unused_keys(log: &FlightLog, explicit: Option<&Path>) -> Result<(Self, Vec<String>), LogError> {
-        let beside = log.path().with_extension("rig.yaml");
-        find(log, explicit, &beside, ".rig.yaml")?
-            .ok_or_else(|| LogError::NoRig { beside, path: log.path().to_owned() })
-    }
+    fn for_log_with_unused_keys(log: &FlightLog, explicit: Option<&Path>) -> Result<(Self, Vec<String>), LogError>;
 
     /// Finds the ground-truth rig in the same way (`NAME.truth.yaml`, or attached); `None` if there is none.
-    pub fn ground_truth_for_log(log: &FlightLog, explicit: Option<&Path>) -> Result<Option<Self>, LogError> {
-        let found = find(log, explicit, &log.path().with_extension("truth.yaml"), ".truth.yaml")?;
-        Ok(found.map(|(rig, _)| rig))
-    }
+    fn ground_truth_for_log(log: &FlightLog, explicit: Option<&Path>) -> Result<Option<Self>, LogError>;
 
     /// Finds the ground truth of this rig, as [`Self::ground_truth_for_log`]. A file that was not asked for is left out if
     /// it belongs to another mechanism, as where one log is run with several rigs.
@@ -33,7 +25,26 @@ impl Rig {
     /// # Errors
     ///
     /// If the given file has another number of joints for a camera of this rig.
-    pub fn own_ground_truth(&self, log: &FlightLog, explicit: Option<&Path>) -> Result<Option<Self>, LogError> {
+    fn own_ground_truth(&self, log: &FlightLog, explicit: Option<&Path>) -> Result<Option<Self>, LogError>;
+}
+
+impl RigOfLog for Rig {
+    fn for_log(log: &FlightLog, explicit: Option<&Path>) -> Result<Self, LogError> {
+        Self::for_log_with_unused_keys(log, explicit).map(|(rig, _)| rig)
+    }
+
+    fn for_log_with_unused_keys(log: &FlightLog, explicit: Option<&Path>) -> Result<(Self, Vec<String>), LogError> {
+        let beside = log.path().with_extension("rig.yaml");
+        find(log, explicit, &beside, ".rig.yaml")?
+            .ok_or_else(|| LogError::NoRig { beside, path: log.path().to_owned() })
+    }
+
+    fn ground_truth_for_log(log: &FlightLog, explicit: Option<&Path>) -> Result<Option<Self>, LogError> {
+        let found = find(log, explicit, &log.path().with_extension("truth.yaml"), ".truth.yaml")?;
+        Ok(found.map(|(rig, _)| rig))
+    }
+
+    fn own_ground_truth(&self, log: &FlightLog, explicit: Option<&Path>) -> Result<Option<Self>, LogError> {
         let Some(truth) = Self::ground_truth_for_log(log, explicit)? else { return Ok(None) };
         let joints = |rig: &Self, key: &str| rig.chain_of_camera(key).map(|chain| chain.joint_count());
         let differs = |key: &&str| joints(&truth, key).is_some_and(|count| joints(self, key) != Some(count));

@@ -7,3 +7,4 @@ mod robot_description;
 pub mod template;
 
 pub use candidates::{MissingSensors, RigCandidate, is_imu_file_of, is_rig_name, missing_sensors, rig_candidates};
+pub use find::RigOfLog;

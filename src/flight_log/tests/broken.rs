@@ -1,6 +1,7 @@
 use std::fs;
 
 use super::*;
+use crate::flight_log::RigOfLog as _;
 use crate::flight_log::{LogError, MessageKind, MessageType};
 
 fn open_error(content: &[u8]) -> String {

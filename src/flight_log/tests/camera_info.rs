@@ -3,6 +3,7 @@
 use super::*;
 use crate::camera::CameraModel;
 use crate::flight_log::MessageKind;
+use crate::flight_log::RigOfLog as _;
 use crate::flight_log::writer::testing as encode;
 
 const SENSOR: [f64; 4] = [100.0, 102.0, 64.5, 47.5];

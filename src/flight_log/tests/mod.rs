@@ -20,6 +20,7 @@ use super::{
     FlightLog, FrameStream, LogCompression, LogWarning, LogWriter, LogWriterOptions, MessageTimes, Odometry,
     SensorFrame,
 };
+use crate::files::RigFile as _;
 use crate::geometry::{RigidTransform, so3};
 use crate::sensors::{GrayImage, Rig};
 

@@ -1,5 +1,7 @@
 use super::*;
 use crate::camera::{CameraModel, Distortion, Projection, RationalLens};
+use crate::files::RigFile as _;
+use crate::flight_log::RigOfLog as _;
 
 /// Writes a log with one message of each kind that a rig needs, and attachments.
 fn write_log(path: &Path, attachments: &[(&str, &str)], camera_info: Option<&CameraModel>) {

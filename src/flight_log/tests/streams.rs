@@ -1,4 +1,5 @@
 use super::*;
+use crate::files::RigFile as _;
 use crate::flight_log::ImageReader;
 use crate::geometry::seconds_from_ns;
 

@@ -7,7 +7,7 @@ const FLATTENING: f64 = 1.0 / 298.257_223_563;
 
 /// Position on the earth, WGS 84.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Geodetic {
+pub struct Geodetic {
     pub(super) latitude_rad: f64,
     pub(super) longitude_rad: f64,
     pub(super) altitude_m: f64,
@@ -15,7 +15,7 @@ pub(crate) struct Geodetic {
 
 impl Geodetic {
     /// Converts degrees and metres; `None` out of range, and at 0° 0°, which receivers output without a fix.
-    pub(crate) fn from_deg(latitude_deg: f64, longitude_deg: f64, altitude_m: f64) -> Option<Self> {
+    pub fn from_deg(latitude_deg: f64, longitude_deg: f64, altitude_m: f64) -> Option<Self> {
         let valid = latitude_deg.abs() <= 90.0
             && longitude_deg.abs() <= 180.0
             && altitude_m.abs() < 1e6
@@ -28,7 +28,7 @@ impl Geodetic {
     }
 
     /// Position this far to the east and to the north at the same altitude, at most some kilometres away.
-    pub(crate) fn moved(self, east_m: f64, north_m: f64) -> Self {
+    pub fn moved(self, east_m: f64, north_m: f64) -> Self {
         let mut moved = self;
         // Each round corrects the rest in the tangent plane by the radius of a sphere, which is wrong by less than 1 %.
         for _ in 0..4 {
@@ -39,7 +39,7 @@ impl Geodetic {
         moved
     }
 
-    pub(crate) fn latitude_longitude_deg(self) -> [f64; 2] {
+    pub fn latitude_longitude_deg(self) -> [f64; 2] {
         [self.latitude_rad, self.longitude_rad].map(f64::to_degrees)
     }
 
@@ -55,7 +55,7 @@ impl Geodetic {
     }
 
     /// Position in the tangent plane at an origin: east, north, up, in metres.
-    pub(crate) fn east_north_up_m(self, origin: Self) -> Vector3<f64> {
+    pub fn east_north_up_m(self, origin: Self) -> Vector3<f64> {
         let (sin_latitude, cos_latitude) = origin.latitude_rad.sin_cos();
         let (sin_longitude, cos_longitude) = origin.longitude_rad.sin_cos();
         let plane_from_earth = Matrix3::new(

@@ -14,7 +14,7 @@ use crate::gimbal::{
 
 /// `tests/data/golden.json`, described in `tests/data/README.md`.
 pub(crate) fn golden() -> Value {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/golden.json");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/golden.json");
     let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{error} ({})", path.display()));
     serde_json::from_str(&text).unwrap()
 }

@@ -11,12 +11,13 @@ use egui_kittest::kittest::Queryable as _;
 use super::rig_question::RigPage;
 use super::tests::{Dropped, TestDesktop, opened, opened_log, run_until};
 use super::{App, OpenFailure, OpenLog, OpenProgress, OpenRequest, RigQuestion};
+use crate::files::RigFile as _;
 use crate::flight_log::{FlightLog, RigCandidate};
 use crate::gui::desktop::Desktop;
 use crate::gui::rendering::headless::{Headless, HeadlessOptions};
-use crate::gui::rendering::painter::Painter;
 use crate::gui::tests::keep_screenshot;
 use crate::gui::theme::ThemeName;
+use crate::painting::painter::Painter;
 
 fn window(open: OpenLog) -> (Harness<'static, App>, Arc<TestDesktop>) {
     let desktop = Arc::new(TestDesktop::default());

@@ -10,9 +10,9 @@ use egui_kittest::kittest::Queryable as _;
 use super::tests::{SampleLog, TestDesktop, opened, run_until, sample_opener};
 use super::{App, OpenLog, OpenRequest, OpenStudy, PlayingLog, StudySource};
 use crate::gui::desktop::Desktop;
+use crate::gui::study::tests::synthetic_study;
 use crate::gui::theme::ThemeName;
 use crate::study::view::Study;
-use crate::study::view::tests::synthetic_study;
 
 /// A study whose runs are the sample log; a static run cannot be opened.
 struct SampleStudy {

@@ -572,8 +572,8 @@ fn the_theme_changes_at_a_key() {
 #[test]
 fn dialogs_are_drawn() {
     use crate::gui::rendering::headless::{Headless, HeadlessOptions};
-    use crate::gui::rendering::painter::Painter;
     use crate::gui::tests::keep_screenshot;
+    use crate::painting::painter::Painter;
 
     let options = HeadlessOptions { size_px: [1366, 768], pixels_per_point: 1.0, theme: ThemeName::Dark };
     let key = |key, modifiers| egui::Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers };

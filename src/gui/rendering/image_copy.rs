@@ -1,14 +1,14 @@
 //! Copies a finished image into egui's render pass on a graphics adapter, pixel by pixel.
 
 /// Pipeline of the copy, for one format of the pass's target.
-pub(in crate::gui) struct ImageCopy {
+pub(crate) struct ImageCopy {
     pipeline: wgpu::RenderPipeline,
     layout: wgpu::BindGroupLayout,
     sampler: wgpu::Sampler,
 }
 
 impl ImageCopy {
-    pub(in crate::gui) fn new(device: &wgpu::Device, target_format: wgpu::TextureFormat) -> Self {
+    pub(crate) fn new(device: &wgpu::Device, target_format: wgpu::TextureFormat) -> Self {
         let shader = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some("copy"),
             source: wgpu::ShaderSource::Wgsl(include_str!("../../../assets/shaders/copy.wgsl").into()),
@@ -70,12 +70,12 @@ impl ImageCopy {
     }
 
     /// Layout of [`Self::group`], also for other pipelines that show images.
-    pub(in crate::gui) fn layout(&self) -> &wgpu::BindGroupLayout {
+    pub(crate) fn layout(&self) -> &wgpu::BindGroupLayout {
         &self.layout
     }
 
     /// Bind group of an image, without interpolation between its pixels.
-    pub(in crate::gui) fn group(&self, device: &wgpu::Device, image: &wgpu::TextureView) -> wgpu::BindGroup {
+    pub(crate) fn group(&self, device: &wgpu::Device, image: &wgpu::TextureView) -> wgpu::BindGroup {
         device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("copy"),
             layout: &self.layout,
@@ -87,7 +87,7 @@ impl ImageCopy {
     }
 
     /// Fills the viewport of the pass with an image of the same size.
-    pub(in crate::gui) fn draw(&self, pass: &mut wgpu::RenderPass<'static>, image: &wgpu::BindGroup) {
+    pub(crate) fn draw(&self, pass: &mut wgpu::RenderPass<'static>, image: &wgpu::BindGroup) {
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, image, &[]);
         pass.draw(0..3, 0..1);

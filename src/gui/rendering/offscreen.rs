@@ -11,9 +11,10 @@ use egui::{ClippedPrimitive, Color32, TextureId, TexturesDelta, Ui};
 use image::RgbaImage;
 use thiserror::Error;
 
-use super::chunks::Chunk;
-use super::headless::{FramePainter, Headless, HeadlessOptions};
-use crate::gui::rendering::scene_backend::SceneBackend;
+use super::headless::{Headless, HeadlessOptions};
+use super::scene_backend::SceneBackend;
+use crate::painting::FramePainter;
+use crate::painting::chunks::Chunk;
 
 /// Format of the target: eight bits per channel in gamma space, in which egui blends.
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;

@@ -14,8 +14,7 @@ use crate::flight_log::{LogWarning, WarningKind};
 use crate::gimbal::{Chain, Parameterization, auto_parameterization};
 use crate::observability::analyse;
 use crate::sensors::Rig;
-use crate::session::tests::memory::recorded;
-use crate::session::{Recording, RunRecord, StepRecord};
+use crate::session::{Recording, RunRecord, StepRecord, record_synthetic};
 use crate::simulation::{SyntheticFlight, SyntheticMount, SyntheticOptions, synthetic_tracks};
 
 /// Period of the images in nanoseconds (20 Hz).
@@ -89,7 +88,8 @@ pub(crate) fn sensor_recording() -> Recording {
             imu_intrinsics_error: [0.01, 0.01],
             ..SyntheticOptions::default()
         });
-        let run = recorded(&flight, "auto:timeshift=on,readout=on,intrinsics=on,imu-intrinsics=on");
+        let spec = "auto:timeshift=on,readout=on,intrinsics=on,imu-intrinsics=on".parse().unwrap();
+        let run = record_synthetic(&flight, &spec).unwrap();
         Recording { runs: vec![run], ..recording_of(&flight, &[]) }
     });
     SENSORS.clone()

@@ -6,8 +6,8 @@ use rayon::prelude::*;
 
 use super::camera;
 use super::layout::{Disc, ImageCorner, ImageShape, SceneDrawing, Segment};
-use crate::gui::rendering::painter::blend;
-use crate::gui::rendering::painter::triangle::{Clip, Plane, SUBPIXELS, spans};
+use crate::painting::painter::blend;
+use crate::painting::painter::triangle::{Clip, Plane, SUBPIXELS, spans};
 
 /// Positions of the samples in a pixel, in 1/256 pixel: the standard pattern of four.
 const SAMPLES: [[i32; 2]; 4] = [[96, 32], [224, 96], [32, 160], [160, 224]];

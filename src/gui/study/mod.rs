@@ -14,7 +14,7 @@ mod points;
 mod runs_table;
 mod strips;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 mod toolbar;
 
 use std::sync::Arc;

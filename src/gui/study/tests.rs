@@ -1,5 +1,8 @@
 //! Tests of the view of a synthetic study: found by label, clicked, and drawn in every theme.
 
+#[path = "../../study/view/tests/synthetic_study.rs"]
+mod synthetic_study;
+
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -7,6 +10,8 @@ use egui::{Event, Modifiers, PointerButton, Pos2, Rect, pos2, vec2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 
+use self::synthetic_study::LOGS;
+pub(crate) use self::synthetic_study::synthetic_study;
 use super::parallel_axes::{default_axes, parallel_axis};
 use super::strips::swarm;
 use super::{StudyOptions, StudyPanel, StudyRequest, StudyState, study_panel_ui, study_ui};
@@ -16,7 +21,6 @@ use crate::gui::rendering::headless::{Headless, HeadlessOptions, draw};
 use crate::gui::tests::keep_screenshot;
 use crate::gui::theme::{Theme, ThemeName};
 use crate::study::view::Study;
-use crate::study::view::tests::{LOGS, synthetic_study};
 use crate::text::Named as _;
 
 fn state(seeds: usize, options: &StudyOptions) -> StudyState {

@@ -7,9 +7,9 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::{By, NodeT as _, Queryable as _};
 
 use super::{MainWindow, Panels, alone_ui};
-use crate::gimbal::tests::parameter;
 use crate::gui::desktop::PanelExport;
 use crate::gui::samples::{sample_images, sample_recording_of};
+use crate::gui::tests::parameter;
 use crate::gui::theme::{Theme, ThemeName};
 use crate::gui::{PanelContext, PanelName, Playback, Presentation, Selection};
 use crate::observability::{SlideDirection, SlidePosition};

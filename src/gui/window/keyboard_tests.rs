@@ -8,7 +8,7 @@ use egui_kittest::kittest::{By, NodeT as _, Queryable as _};
 use super::Preset;
 use super::tests::{Bench, SECOND_NS, bench, bench_of, commands_of, sample};
 use crate::frontend::FeatureId;
-use crate::gimbal::tests::parameter;
+use crate::gui::tests::parameter;
 use crate::gui::theme::ThemeName;
 use crate::gui::{Dialog, PanelName};
 use crate::session::{Command, Marker, Markers};

@@ -8,11 +8,11 @@ use super::tests::{Bench, SECOND_NS, bench_of, bench_with, sample};
 use super::{MainWindow, Preset, window_ui};
 use crate::gui::painted_texts::{PaintedText, painted_texts};
 use crate::gui::rendering::headless::{Headless, HeadlessOptions};
-use crate::gui::rendering::painter::Painter;
 use crate::gui::samples::sample_images;
 use crate::gui::tests::keep_screenshot;
 use crate::gui::theme::{Theme, ThemeName};
 use crate::gui::{PanelContext, PanelName, Playback, Presentation, ReadingCursor, Selection};
+use crate::painting::painter::Painter;
 
 /// The plot of the first parameter.
 const PLOT: &str = "I.rx";

@@ -8,8 +8,8 @@ use egui_kittest::kittest::{NodeT as _, Queryable as _};
 
 use super::{MainWindow, Preset, window_ui};
 use crate::estimator::{FactorKind, StepWarning};
-use crate::gimbal::tests::parameter;
 use crate::gui::samples::{sample_images, sample_recording_of};
+use crate::gui::tests::parameter;
 use crate::gui::theme::{Theme, ThemeName};
 use crate::gui::{PanelContext, PanelName, Playback, Presentation, Selection};
 use crate::observability::{Determination, SlideRequest};

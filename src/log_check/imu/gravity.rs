@@ -184,6 +184,7 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
+    use crate::files::RigFile as _;
     use crate::log_check::tests::rig_text;
 
     /// Titles for windows of 0.5 s with these norms of the specific force.

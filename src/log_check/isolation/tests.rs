@@ -9,6 +9,7 @@ use super::source::Source;
 use super::statement::Statement;
 use super::{Compared, Pair, Quantity, Rotations, culprits, motion_culprits, rotation};
 use crate::faults::FaultKind;
+use crate::files::RigFile as _;
 use crate::geometry::{RigidTransform, so3};
 use crate::log_check::imu::ImuFacts;
 use crate::log_check::report::Findings;

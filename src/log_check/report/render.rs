@@ -1,35 +1,8 @@
 use std::fmt::{Display, Formatter, Result};
 
-use super::{Area, CheckReport, Severity};
+use super::{CheckReport, Severity};
 use crate::table::text::{TextTable, left, right};
 use crate::text::{printable, shortened, without_signed_zeros};
-
-impl Severity {
-    /// Lowercase name, printed before a finding.
-    pub fn label(self) -> &'static str {
-        match self {
-            Self::Good => "good",
-            Self::Note => "note",
-            Self::Warning => "warning",
-            Self::Error => "error",
-        }
-    }
-}
-
-impl Area {
-    pub fn label(self) -> &'static str {
-        match self {
-            Self::Log => "log",
-            Self::Time => "time",
-            Self::Imu => "IMU",
-            Self::Motion => "motion",
-            Self::Encoders => "encoders",
-            Self::Images => "images",
-            Self::Intrinsics => "intrinsics",
-            Self::Extrinsics => "extrinsics",
-        }
-    }
-}
 
 /// Text report: the verdict, a table of topics, then all findings, most severe first.
 impl Display for CheckReport {

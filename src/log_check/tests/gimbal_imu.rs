@@ -7,6 +7,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use super::super::report::Findings;
 use super::super::survey::Survey;
 use super::{Noise, rate_at, rig_text};
+use crate::files::RigFile as _;
 use crate::geometry::{ns_from_seconds, so3};
 use crate::log_check::gimbal::gimbal_imu::check_gimbal_imu;
 use crate::log_check::report::{ImageRotation, Severity};

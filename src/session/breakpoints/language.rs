@@ -24,7 +24,7 @@ impl Language for StepQuantities {
 
     fn operand(parser: &mut Parser<'_, Self>, _number: bool) -> Result<Expression<Self>> {
         let begin = parser.begin();
-        match parser.next() {
+        match parser.next_token() {
             Token::Name(name) if parser.take(&Token::Open) => call(parser, &name, begin),
             Token::Name(name) => plain(parser, &name, begin),
             Token::End => {
@@ -82,7 +82,7 @@ fn call(parser: &mut Parser<'_, StepQuantities>, name: &str, begin: usize) -> Re
             flag(StepFlag::Event(kinds))
         }
         "singular" => {
-            let Token::Number(number) = parser.next() else {
+            let Token::Number(number) = parser.next_token() else {
                 return Err(parser.problem_at(inside, "expected the number of a singular value, 1 for the largest"));
             };
             if number < 1.0 || number.fract() != 0.0 || number > 1e6 {

@@ -2,11 +2,11 @@ use std::sync::Arc;
 
 use super::{Breakpoints, Condition, StepContext};
 use crate::estimator::{Event, EventKind, FactorKind, IterationReport, ResidualSummary};
-use crate::gimbal::tests::parameter;
 use crate::observability::RankReport;
 use crate::sensors::Rig;
 use crate::session::record::{Recording, RunRecord, StepRecord};
 use crate::session::tests::memory::recorded;
+use crate::session::tests::parameter;
 use crate::simulation::{SyntheticOptions, synthetic_tracks};
 
 /// A run over a synthetic flight with its rig.

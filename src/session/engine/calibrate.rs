@@ -1,6 +1,7 @@
 //! Offline calibration of a log: features of both cameras are tracked first, then the calibration is estimated, from the
 //! posterior of earlier flights if there is one; errors against ground truth by stage.
 
+use crate::flight_log::RigOfLog as _;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};

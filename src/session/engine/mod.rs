@@ -26,6 +26,7 @@ mod shifted_imu;
 mod step_inputs;
 mod stereo_pairs;
 mod stopwatch;
+mod synthetic_run;
 mod threads;
 mod tracker;
 
@@ -50,4 +51,7 @@ pub(in crate::session) use recompute::{Detail, RecomputeRequest, RecomputeThread
 pub(in crate::session) use run_engine::RunEngine;
 pub(in crate::session) use step_inputs::OwnedStepInput;
 pub use stopwatch::Stopwatch;
+pub use synthetic_run::record_synthetic;
+#[cfg(test)]
+pub(in crate::session) use synthetic_run::{input_of, recorded_by};
 pub(in crate::session) use threads::Engine;

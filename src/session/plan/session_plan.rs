@@ -1,5 +1,6 @@
 //! The plan of a session: log, rigs, time span, and the runs with their main cameras.
 
+use crate::flight_log::RigOfLog as _;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::Arc;

@@ -67,7 +67,7 @@ mod tests {
     #[test]
     fn a_log_without_a_usable_image_is_checked() {
         let request = SessionRequest {
-            log_path: PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("sample_logs/garden.mcap"),
+            log_path: PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../sample_logs/garden.mcap"),
             duration_s: Some(0.5),
             ..SessionRequest::default()
         };

@@ -212,7 +212,7 @@ mod tests {
 
     fn garden(duration_s: f64) -> SessionPlan {
         let request = SessionRequest {
-            log_path: PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("sample_logs/garden.mcap"),
+            log_path: PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../sample_logs/garden.mcap"),
             duration_s: Some(duration_s),
             ..SessionRequest::default()
         };

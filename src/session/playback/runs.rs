@@ -101,7 +101,7 @@ mod tests {
 
     #[test]
     fn a_cluster_that_is_added_leaves_out_a_camera_that_it_cannot_use() {
-        let log_path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("sample_logs/garden.mcap");
+        let log_path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../sample_logs/garden.mcap");
         let request = SessionRequest { log_path, duration_s: Some(0.3), ..SessionRequest::default() };
         let mut plan = SessionPlan::open(&request).unwrap();
         let rig = Arc::make_mut(&mut plan.rig);

@@ -7,10 +7,11 @@ use crate::faults::{Area, Fault, FaultKind, Severity, correct_joint_angles};
 use crate::log_check::{Basis, Finding, FindingInterval};
 use crate::sensors::Rig;
 use crate::session::diagnosis::diagnose_run;
+use crate::session::engine::input_of;
 use crate::session::engine::{History, OwnedStepInput, RunEngine, estimator_config};
 use crate::session::plan::RunSpec;
 use crate::session::record::{Diagnosis, DiagnosisVerdict, RunRecord};
-use crate::session::tests::memory::{estimated_step, input_of};
+use crate::session::tests::memory::estimated_step;
 use crate::simulation::{SyntheticOptions, synthetic_tracks};
 
 /// Stamp from which on a fault of the recording acts, in nanoseconds.
@@ -45,7 +46,7 @@ fn diagnosed_until(
     let history = Arc::new(History::new(usize::MAX));
     let mut record = RunRecord::new(spec, "cam0".to_owned());
     for (step, frame) in flight.frames.iter().enumerate() {
-        let mut input = input_of(frame, sigma_rad);
+        let mut input = input_of(frame, Some(sigma_rad));
         input_fault(&mut input, &rig);
         let input = Arc::new(input);
         history.inputs().push(Arc::clone(&input));

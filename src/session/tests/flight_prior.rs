@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::memory::input_of;
 use crate::estimator::{CalibrationPosterior, EstimatorConfig};
 use crate::gimbal::Chain;
 use crate::sensors::ChainPrior;
+use crate::session::engine::input_of;
 use crate::session::engine::{RunEngine, estimator_config};
 use crate::session::plan::{FlightPrior, RunSpec};
 use crate::simulation::{SyntheticFlight, SyntheticFrame, SyntheticOptions, synthetic_tracks};
@@ -46,7 +46,7 @@ fn run(
     let sigma_rad = config.encoder_sigma_rad.unwrap();
     let mut engine = RunEngine::new(config, None);
     for frame in frames {
-        engine.step_without_rank(&input_of(frame, sigma_rad));
+        engine.step_without_rank(&input_of(frame, Some(sigma_rad)));
     }
     engine.estimator().posterior().expect("the run has a window")
 }

@@ -4,13 +4,12 @@ use std::path::PathBuf;
 use std::sync::{Arc, LazyLock};
 
 use crate::estimator::{FactorKind, FrameId, JacobianFactor, Phase, StageTimes};
-use crate::gimbal;
 use crate::session::breakpoints::Condition;
+use crate::session::engine::input_of;
 use crate::session::engine::{History, RunEngine, apply_fork, estimator_config};
 use crate::session::plan::{ForkChanges, RunSpec, SessionPlan, SessionRequest};
 use crate::session::playback::{Command, Session};
 use crate::session::record::StepRecord;
-use crate::session::tests::memory::input_of;
 use crate::simulation::{SyntheticFlight, SyntheticOptions, synthetic_tracks};
 
 /// A run on a synthetic flight, with its engine and inputs.
@@ -33,7 +32,7 @@ fn simulated_run(spec: &str) -> SimulatedRun {
     let mut engine = RunEngine::new(config, None);
     let history = Arc::new(History::new(usize::MAX));
     let steps = flight.frames.iter().enumerate().map(|(step, frame)| {
-        let input = Arc::new(input_of(frame, sigma_rad));
+        let input = Arc::new(input_of(frame, Some(sigma_rad)));
         history.inputs().push(Arc::clone(&input));
         history.before_step(step, &engine, &input);
         engine.step(&input)
@@ -67,7 +66,8 @@ fn position_difference_m(one: &StepRecord, other: &StepRecord) -> f64 {
 
 fn parameter(record: &StepRecord, name: &str) -> (f64, f64) {
     let calibration = &record.report.calibration;
-    let index = calibration.parameters.iter().position(|known| *known == gimbal::tests::parameter(name)).unwrap();
+    let index =
+        calibration.parameters.iter().position(|known| *known == crate::session::tests::parameter(name)).unwrap();
     (calibration.values[index], calibration.sigmas[index])
 }
 
@@ -256,7 +256,7 @@ fn encoder_readings_can_be_disabled() {
 #[test]
 fn one_camera_of_two_can_be_disabled() {
     let request = SessionRequest {
-        log_path: PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("sample_logs/garden.mcap"),
+        log_path: PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../sample_logs/garden.mcap"),
         specs: vec!["cluster".parse().unwrap()],
         duration_s: Some(3.5),
         ..SessionRequest::default()
@@ -316,7 +316,7 @@ fn a_run_that_initializes_can_be_forked() {
 #[test]
 fn a_session_stops_at_breakpoints_and_forks_there() {
     let request = SessionRequest {
-        log_path: PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("sample_logs/garden.mcap"),
+        log_path: PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../sample_logs/garden.mcap"),
         duration_s: Some(4.0),
         ..SessionRequest::default()
     };

@@ -3,28 +3,11 @@
 use std::sync::Arc;
 
 use crate::estimator::{ColumnGroup, Phase, StageTimes};
-use crate::session::engine::{History, OwnedStepInput, RunEngine, estimator_config};
-use crate::session::record::{RunRecord, StepImage, StepRecord};
-use crate::simulation::{SyntheticFlight, SyntheticFrame, SyntheticOptions, synthetic_tracks};
+use crate::session::engine::{History, OwnedStepInput, RunEngine, estimator_config, input_of, recorded_by};
+use crate::session::record::{RunRecord, StepRecord};
+use crate::simulation::{SyntheticFlight, SyntheticOptions, synthetic_tracks};
 
-/// The step input of a synthetic frame.
-pub(in crate::session) fn input_of(frame: &SyntheticFrame, encoder_sigma_rad: f64) -> OwnedStepInput {
-    OwnedStepInput {
-        frame_index: frame.index,
-        stamp_ns: frame.stamp_ns,
-        log_time_ns: frame.stamp_ns,
-        imu: frame.imu.clone(),
-        imu_after: Vec::new(),
-        image_times_s: Vec::new(),
-        gimbal_imu: frame.gimbal_imu.clone(),
-        joint_angles: frame.encoder_angles(encoder_sigma_rad),
-        images: vec![StepImage { index: Some(frame.index), tracks: Arc::new(frame.tracks.clone()) }],
-        ground_truth: Some(frame.true_world_from_imu),
-        frontend_ms: 0.0,
-    }
-}
-
-pub(crate) fn recorded(flight: &SyntheticFlight, spec: &str) -> RunRecord {
+pub(in crate::session) fn recorded(flight: &SyntheticFlight, spec: &str) -> RunRecord {
     recorded_with(flight, spec, None)
 }
 
@@ -53,15 +36,7 @@ fn run_by(
     spec: &str,
     keep_linearization_every: Option<usize>,
 ) -> RunRecord {
-    let spec: crate::session::RunSpec = spec.parse().unwrap();
-    let config = estimator_config(&flight.given_rig, &spec).unwrap();
-    let sigma_rad = config.encoder_sigma_rad.unwrap();
-    let mut engine = RunEngine::new(config, keep_linearization_every);
-    let mut run = RunRecord::new(spec, "cam0".to_owned());
-    for frame in &flight.frames {
-        run.push(step(&mut engine, &input_of(frame, sigma_rad)));
-    }
-    run
+    recorded_by(step, flight, &spec.parse().unwrap(), keep_linearization_every).unwrap()
 }
 
 /// Ten minutes at 20 fps must fit into 1.5 GiB, tracks included: 134 kB per frame. A frame with 150 features in a
@@ -114,7 +89,7 @@ fn snapshots_fill_their_budget_and_give_back_every_step() {
     let history = History::new(BUDGET_BYTES);
     let mut steps = Vec::new();
     for (number, frame) in flight.frames.iter().enumerate() {
-        let input = Arc::new(input_of(frame, sigma_rad));
+        let input = Arc::new(input_of(frame, Some(sigma_rad)));
         history.inputs().push(Arc::clone(&input));
         history.before_step(number, &engine, &input);
         steps.push(engine.step(&input));

@@ -6,8 +6,9 @@ use std::sync::mpsc::sync_channel;
 
 use rayon::prelude::*;
 
-use super::memory::{estimated_step, input_of};
+use super::memory::estimated_step;
 use crate::estimator::Phase;
+use crate::session::engine::input_of;
 use crate::session::engine::{EarlierPasses, EngineMessage, OwnedStepInput, RunEngine, estimator_config};
 use crate::session::record::{PoseError, RunRecord};
 use crate::simulation::{SyntheticFlight, SyntheticOptions, synthetic_tracks};
@@ -22,7 +23,7 @@ fn recorded_in_passes(flight: &SyntheticFlight, text: &str) -> (RunRecord, Vec<E
     let mut config = estimator_config(&flight.given_rig, &spec).unwrap();
     let sigma_rad = config.encoder_sigma_rad.unwrap();
     let inputs: Vec<Arc<OwnedStepInput>> =
-        flight.frames.iter().map(|frame| Arc::new(input_of(frame, sigma_rad))).collect();
+        flight.frames.iter().map(|frame| Arc::new(input_of(frame, Some(sigma_rad)))).collect();
     let (results, progress) = sync_channel(inputs.len());
     let earlier = EarlierPasses { run: 3, results: &results };
     for number in 1..spec.passes {

@@ -2,10 +2,10 @@
 
 use super::memory::estimated;
 use crate::faults::LensChange;
-use crate::gimbal::tests::parameter;
 use crate::gimbal::{ParameterGroup, ParameterId, Quantity};
 use crate::observability::Determination;
 use crate::session::FlightVerdicts;
+use crate::session::tests::parameter;
 use crate::simulation::{SyntheticOptions, synthetic_tracks};
 use crate::text::Named as _;
 

@@ -6,7 +6,7 @@ use super::document::{PlanError, SEEDS, Section, parse};
 use super::study_plan::{DisturbanceSet, JobLimits, LOG_PLACE, LogSource, SlurmOptions, StudyOutput, StudyPlan};
 use super::tables;
 use crate::session::{RunSpec, TrajectorySpec, TrajectorySpecError};
-use crate::simulation::Disturbances;
+use crate::simulated_log::Disturbances;
 use crate::study::job::Bundle;
 use crate::study::perturbation::{Distribution, MagnitudeError, RigChange, RigPerturbation, RigQuantity};
 use crate::study::recipe::{EncoderNoise, FlightRecipe};

@@ -17,8 +17,8 @@ pub struct RowFilter {
 }
 
 /// A property of a row other than a comparison of numbers.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) enum CellTest {
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum CellTest {
     /// Name of a Boolean column.
     Flag(String),
     /// True if a cell is not empty.
@@ -28,8 +28,8 @@ pub(crate) enum CellTest {
     Texts(ComparisonOperator, Text, Text),
 }
 
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Text {
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Text {
     Literal(String),
     Column(String),
 }
@@ -138,7 +138,7 @@ fn column_here(parser: &Parser<'_, StudyTable>) -> Option<(String, ColumnType)> 
 /// Parses the name of a column.
 fn column(parser: &mut Parser<'_, StudyTable>) -> Result<(String, ColumnType)> {
     if let Some(found) = column_here(parser) {
-        parser.next();
+        parser.next_token();
         return Ok(found);
     }
     let Token::Name(name) = parser.peek() else {
@@ -156,7 +156,7 @@ fn flag(parser: &mut Parser<'_, StudyTable>, column: String) -> Result<Expressio
     let Token::Compare(comparison) = *parser.peek() else {
         return Ok(Expression::Predicate(Predicate::Flag(CellTest::Flag(column))));
     };
-    parser.next();
+    parser.next_token();
     let word = match parser.peek() {
         Token::Name(name) => name.to_ascii_lowercase(),
         Token::Number(number) => number.to_string(),
@@ -167,7 +167,7 @@ fn flag(parser: &mut Parser<'_, StudyTable>, column: String) -> Result<Expressio
         "false" | "off" | "no" | "0" => 0.0,
         _ => return Err(parser.problem(format!("'{column}' is on or off: expected one of them"))),
     };
-    parser.next();
+    parser.next_token();
     let (left, right) = (Number::Quantity(column, span), Number::Literal(wanted));
     Ok(Expression::Predicate(Predicate::Compared(comparison, left, right)))
 }
@@ -175,14 +175,14 @@ fn flag(parser: &mut Parser<'_, StudyTable>, column: String) -> Result<Expressio
 /// Parses the rest of a comparison whose left side is a text.
 fn text_comparison(parser: &mut Parser<'_, StudyTable>, left: Text) -> Result<Expression<StudyTable>> {
     let begin = parser.begin();
-    let test = match (parser.next(), left) {
+    let test = match (parser.next_token(), left) {
         (Token::Name(word), Text::Column(column)) if word == "contains" => {
             CellTest::Contains(column, text_literal(parser)?.to_lowercase())
         }
         (Token::Compare(comparison), left) => {
             let right = match column_here(parser) {
                 Some((column, ColumnType::Text)) => {
-                    parser.next();
+                    parser.next_token();
                     Text::Column(column)
                 }
                 _ => Text::Literal(text_literal(parser)?),

@@ -18,13 +18,13 @@ pub struct ConditionProblem {
 
 /// Range of characters in the text, from 0; `end` is exclusive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct TextRange {
-    pub(crate) begin: usize,
-    pub(crate) end: usize,
+pub struct TextRange {
+    pub begin: usize,
+    pub end: usize,
 }
 
 /// Values of the quantities `N` and of the properties `F` of a condition.
-pub(crate) trait Values<N, F> {
+pub trait Values<N, F> {
     /// Result of a comparison in which a value is missing.
     const MISSING: Option<bool>;
 
@@ -36,7 +36,7 @@ pub(crate) trait Values<N, F> {
 
 /// A numerical sub-expression over quantities `N`.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Number<N> {
+pub enum Number<N> {
     Literal(f64),
     Quantity(N, TextRange),
     Negated(Box<Self>),
@@ -46,7 +46,7 @@ pub(crate) enum Number<N> {
 
 impl<N> Number<N> {
     /// The value; `None` if a quantity is missing or the result is not finite.
-    pub(crate) fn value<F>(&self, values: &impl Values<N, F>) -> Option<f64> {
+    pub fn value<F>(&self, values: &impl Values<N, F>) -> Option<f64> {
         let value = match self {
             Self::Literal(value) => *value,
             Self::Quantity(quantity, _) => values.number(quantity)?,
@@ -58,7 +58,7 @@ impl<N> Number<N> {
     }
 
     /// Calls `visit` for every quantity, from left to right.
-    pub(crate) fn visit<'a>(&'a self, visit: &mut dyn FnMut(&'a N, TextRange)) {
+    pub fn visit<'a>(&'a self, visit: &mut dyn FnMut(&'a N, TextRange)) {
         match self {
             Self::Literal(_) => {}
             Self::Quantity(quantity, span) => visit(quantity, *span),
@@ -73,7 +73,7 @@ impl<N> Number<N> {
 
 /// An operation on two numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Arithmetic {
+pub enum Arithmetic {
     Sum,
     Difference,
     Product,
@@ -97,7 +97,7 @@ impl Arithmetic {
 
 /// A sub-expression over quantities `N` and properties `F` that is true or false.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Predicate<N, F> {
+pub enum Predicate<N, F> {
     Flag(F),
     Compared(ComparisonOperator, Number<N>, Number<N>),
     Not(Box<Self>),
@@ -107,7 +107,7 @@ pub(crate) enum Predicate<N, F> {
 
 impl<N, F> Predicate<N, F> {
     /// True if the condition holds; `None` if a missing value decides it.
-    pub(crate) fn holds<V: Values<N, F>>(&self, values: &V) -> Option<bool> {
+    pub fn holds<V: Values<N, F>>(&self, values: &V) -> Option<bool> {
         match self {
             Self::Flag(flag) => values.flag(flag),
             Self::Compared(comparison, left, right) => {
@@ -130,7 +130,7 @@ impl<N, F> Predicate<N, F> {
     }
 
     /// Calls `visit` for every quantity, from left to right.
-    pub(crate) fn visit<'a>(&'a self, visit: &mut dyn FnMut(&'a N, TextRange)) {
+    pub fn visit<'a>(&'a self, visit: &mut dyn FnMut(&'a N, TextRange)) {
         match self {
             Self::Flag(_) => {}
             Self::Compared(_, left, right) => {
@@ -147,7 +147,7 @@ impl<N, F> Predicate<N, F> {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum ComparisonOperator {
+pub enum ComparisonOperator {
     Less,
     LessOrEqual,
     Greater,
@@ -162,7 +162,7 @@ impl ComparisonOperator {
     }
 
     /// True if the comparison holds for two values in this order.
-    pub(crate) fn holds_for(self, order: Ordering) -> bool {
+    pub fn holds_for(self, order: Ordering) -> bool {
         match self {
             Self::Less => order.is_lt(),
             Self::LessOrEqual => order.is_le(),

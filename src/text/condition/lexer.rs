@@ -3,7 +3,7 @@
 use super::expression::{ComparisonOperator, ConditionProblem, TextRange};
 
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Token {
+pub enum Token {
     Number(f64),
     Name(String),
     Quoted(String),

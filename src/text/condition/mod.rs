@@ -8,6 +8,6 @@ mod lexer;
 mod parser;
 
 pub use expression::ConditionProblem;
-pub(crate) use expression::{Arithmetic, ComparisonOperator, Number, Predicate, TextRange, Values};
-pub(crate) use lexer::Token;
-pub(crate) use parser::{Expression, Language, Parser, parse};
+pub use expression::{Arithmetic, ComparisonOperator, Number, Predicate, TextRange, Values};
+pub use lexer::Token;
+pub use parser::{Expression, Language, Parser, parse};

@@ -21,7 +21,7 @@ const UNITS: [(&str, f64); 11] = [
 ];
 
 /// Names in a condition, and the differences of its grammar.
-pub(crate) trait Language: Sized {
+pub trait Language: Sized {
     /// A quantity that is a number.
     type Quantity;
     /// A property that is true or false.
@@ -43,7 +43,7 @@ pub(crate) trait Language: Sized {
 }
 
 /// A sub-expression that may be a number or a predicate.
-pub(crate) enum Expression<L: Language> {
+pub enum Expression<L: Language> {
     Number(Number<L::Quantity>),
     Predicate(Condition<L>),
 }
@@ -52,8 +52,8 @@ pub(crate) enum Expression<L: Language> {
 pub(crate) type Condition<L> = Predicate<<L as Language>::Quantity, <L as Language>::Flag>;
 
 /// Position of the parser in the tokens of a text.
-pub(crate) struct Parser<'a, L> {
-    pub(crate) language: &'a L,
+pub struct Parser<'a, L> {
+    pub language: &'a L,
     text: &'a str,
     tokens: Vec<(Token, TextRange)>,
     at: usize,
@@ -71,7 +71,7 @@ fn too_long(text: &str, message: &str) -> ConditionProblem {
 }
 
 /// Parses a condition in a language.
-pub(crate) fn parse<L: Language>(text: &str, language: &L) -> Result<Condition<L>> {
+pub fn parse<L: Language>(text: &str, language: &L) -> Result<Condition<L>> {
     if text.len() > L::MAX_BYTES {
         return Err(too_long(text, &format!("{} bytes, expected at most {}", text.len(), L::MAX_BYTES)));
     }
@@ -92,7 +92,7 @@ pub(crate) fn parse<L: Language>(text: &str, language: &L) -> Result<Condition<L
 }
 
 impl<L: Language> Parser<'_, L> {
-    pub(crate) fn peek(&self) -> &Token {
+    pub fn peek(&self) -> &Token {
         &self.tokens[self.at.min(self.tokens.len() - 1)].0
     }
 
@@ -101,40 +101,40 @@ impl<L: Language> Parser<'_, L> {
     }
 
     /// Start position of the next token.
-    pub(crate) fn begin(&self) -> usize {
+    pub fn begin(&self) -> usize {
         self.span().begin
     }
 
     /// Range from a position to the end of the previous token.
-    pub(crate) fn since(&self, begin: usize) -> TextRange {
+    pub fn since(&self, begin: usize) -> TextRange {
         TextRange { begin, end: self.tokens[self.at.saturating_sub(1)].1.end }
     }
 
-    pub(crate) fn next(&mut self) -> Token {
+    pub fn next_token(&mut self) -> Token {
         let token = self.peek().clone();
         self.at += 1;
         token
     }
 
-    pub(crate) fn take(&mut self, wanted: &Token) -> bool {
+    pub fn take(&mut self, wanted: &Token) -> bool {
         let found = self.peek() == wanted;
         self.at += usize::from(found);
         found
     }
 
     /// Takes the name of a function with its opening bracket.
-    pub(crate) fn take_call(&mut self, function: &str) -> bool {
+    pub fn take_call(&mut self, function: &str) -> bool {
         let is_name = matches!(self.peek(), Token::Name(name) if name == function);
         let found = is_name && self.tokens.get(self.at + 1).is_some_and(|(token, _)| *token == Token::Open);
         self.at += 2 * usize::from(found);
         found
     }
 
-    pub(crate) fn problem(&self, message: impl Into<String>) -> ConditionProblem {
+    pub fn problem(&self, message: impl Into<String>) -> ConditionProblem {
         self.problem_at(self.begin(), message)
     }
 
-    pub(crate) fn problem_at(&self, at: usize, message: impl Into<String>) -> ConditionProblem {
+    pub fn problem_at(&self, at: usize, message: impl Into<String>) -> ConditionProblem {
         ConditionProblem { text: self.text.to_owned(), column: at + 1, message: message.into() }
     }
 
@@ -307,21 +307,21 @@ impl<L: Language> Parser<'_, L> {
     }
 
     /// Parses the argument of a function, a number.
-    pub(crate) fn argument(&mut self) -> Result<Number<L::Quantity>> {
+    pub fn argument(&mut self) -> Result<Number<L::Quantity>> {
         self.operand_number(|parser| parser.deeper(Self::sum))
     }
 
     /// Parses a name, with or without quotes; `expected` is its description in the message.
-    pub(crate) fn name(&mut self, expected: &str) -> Result<String> {
+    pub fn name(&mut self, expected: &str) -> Result<String> {
         let begin = self.begin();
-        match self.next() {
+        match self.next_token() {
             Token::Name(name) | Token::Quoted(name) => Ok(name),
             _ => Err(self.problem_at(begin, format!("expected {expected}"))),
         }
     }
 
     /// Parses the closing bracket of an expression that begins at a position.
-    pub(crate) fn close(&mut self, begin: usize) -> Result<()> {
+    pub fn close(&mut self, begin: usize) -> Result<()> {
         if self.take(&Token::Close) {
             return Ok(());
         }
@@ -330,7 +330,7 @@ impl<L: Language> Parser<'_, L> {
 
     /// Parses a quoted text, or everything up to the next space or bracket, such as `not-initialized`; `None` if there
     /// is nothing.
-    pub(crate) fn word(&mut self) -> Option<String> {
+    pub fn word(&mut self) -> Option<String> {
         if let Token::Quoted(text) = self.peek().clone() {
             self.at += 1;
             return Some(text);

@@ -6,6 +6,7 @@ use std::path::Path;
 use std::process::Command;
 use std::sync::Arc;
 
+use dcvins::files::RigFile as _;
 use dcvins::flight_log::{FlightLog, FrameStream};
 use dcvins::geometry::so3;
 use dcvins::sensors::{CameraMount, Rig};

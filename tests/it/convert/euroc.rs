@@ -5,6 +5,7 @@ use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 
+use dcvins::flight_log::RigOfLog as _;
 use dcvins::flight_log::{FlightLog, FrameStream, SensorFrame};
 use dcvins::sensors::{CameraMount, Rig};
 use image::{GrayImage, Luma};

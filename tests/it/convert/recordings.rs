@@ -6,6 +6,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
 
+use dcvins::files::RigFile as _;
 use dcvins::flight_log::FlightLog;
 use dcvins::flight_log::convert::{
     AutopilotLog, AutopilotLogKind, ConversionReport, ConvertError, ConvertOptions, VideoClock, convert_with,

@@ -14,7 +14,7 @@ use crate::sensors::{AttitudeFrame, AttitudeMessage, AttitudeSource, BodyAxes, G
 pub(crate) const MAX_VEHICLE_GAP_NS: i64 = 200_000_000;
 
 /// Message types of a vehicle's attitude.
-pub(crate) const VEHICLE_KINDS: [MessageKind; 6] = [
+pub const VEHICLE_KINDS: [MessageKind; 6] = [
     MessageKind::QuaternionStamped,
     MessageKind::PoseStamped,
     MessageKind::Odometry,

@@ -4,6 +4,7 @@ use nalgebra::{Vector2, Vector3};
 
 use super::*;
 use crate::camera::{CameraModel, Distortion};
+use crate::files::RigFile as _;
 use crate::sensors::{BodyAxes, Rig};
 use crate::text::Named as _;
 

@@ -1,5 +1,6 @@
 //! Text of a template: the rig in its usual format, with comments.
 
+use crate::files::RigFile as _;
 use std::fmt::Write as _;
 
 use super::RigTemplate;

@@ -10,7 +10,7 @@ use egui::{ColorImage, PaintCallbackInfo};
 use parking_lot::Mutex;
 
 use crate::gui::rendering::image_copy::ImageCopy;
-use crate::gui::rendering::painter::{Painter, PixelRect};
+use crate::painting::painter::{Painter, PixelRect};
 
 /// Sends the changed parts to the adapter and shows the image.
 pub(super) struct CopyCallback {

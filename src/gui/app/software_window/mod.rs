@@ -12,8 +12,8 @@ use egui::epaint::ClippedShape;
 use egui::{Color32, Context, FullOutput, Plugin, Pos2, Rect, Shape};
 use parking_lot::Mutex;
 
-use crate::gui::rendering::chunks::Tessellation;
-use crate::gui::rendering::painter::Painter;
+use crate::painting::chunks::Tessellation;
+use crate::painting::painter::Painter;
 use adapter_image::{CopyCallback, UnsentParts};
 
 /// Replaces the meshes of a frame by the copy of an image.

@@ -6,6 +6,7 @@ use std::path::Path;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use tempfile::TempDir;
 
+use crate::files::RigFile as _;
 use crate::flight_log::{FlightLog, LogWriter, LogWriterOptions, MessageTimes, MessageType};
 use crate::geometry::{RigidTransform, ns_from_seconds, seconds_from_ns, so3};
 use crate::log_check::check;

@@ -129,7 +129,7 @@ fn null_projector(rank: &SetRank) -> Vec<f64> {
 }
 
 fn path() -> std::path::PathBuf {
-    std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/sensor_nulls.json")
+    std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/sensor_nulls.json")
 }
 
 #[test]

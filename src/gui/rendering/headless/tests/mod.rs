@@ -1,0 +1,3 @@
+mod pdf;
+mod raster;
+mod svg;

@@ -1,0 +1,7 @@
+mod flight;
+mod images;
+mod logs;
+mod planting;
+mod prescribed;
+mod tracking;
+mod uneven;
