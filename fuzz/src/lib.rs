@@ -9,11 +9,13 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, LazyLock};
 
 use dcvins::export::{self, EvaluationOptions};
+use dcvins::files::RigFile as _;
 use dcvins::files::stills::{read_stills, read_stills_chain};
 use dcvins::files::urdf::{CameraAxes, RobotModel};
 use dcvins::flight_log::convert::convert;
 use dcvins::flight_log::{
     FlightLog, FrameStream, ImageReader, LogWriter, LogWriterOptions, MessageKind, MessageTimes, MessageType,
+    RigOfLog as _,
 };
 use dcvins::log_check;
 use dcvins::sensors::Rig;

@@ -9,6 +9,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use dcvins::camera::{CameraModel, Distortion, Projection};
+use dcvins::files::RigFile as _;
 use dcvins::flight_log::{
     LogCompression, LogWriter, LogWriterOptions, MessageKind, MessageTimes, MessageType, Odometry,
 };
