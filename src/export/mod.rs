@@ -3,6 +3,8 @@
 pub(crate) mod calibration_files;
 pub(crate) mod calibration_report;
 mod check_cache;
+#[cfg(test)]
+mod documented_tests;
 mod error;
 mod euroc;
 mod evaluation;

@@ -173,7 +173,7 @@ fn sigma_columns<'a>() -> [Column<'a, (f64, &'a PlannedParameter, f64, f64)>; 5]
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::table::documented;
+    use crate::export::documented_tests::documented;
 
     #[test]
     fn the_documents_list_the_columns() {

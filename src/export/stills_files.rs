@@ -154,7 +154,7 @@ fn figures(outcome: &StillsOutcome) -> Vec<(&'static str, Vec<u8>)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::table::documented;
+    use crate::export::documented_tests::documented;
 
     #[test]
     fn the_documents_list_the_columns() {

@@ -79,7 +79,7 @@ pub(super) fn frames_csv(run: &RunRecord, timing: bool) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::table::documented;
+    use crate::export::documented_tests::documented;
 
     #[test]
     fn the_documents_list_the_columns() {

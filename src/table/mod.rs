@@ -12,7 +12,6 @@ pub mod text;
 
 pub use self::alignment::align_numbers;
 pub use self::cell::{Cell, CellValue, ColumnType, Stamp};
-pub use self::column::documented;
 pub use self::column::{Column, Direction, Style, Tone, distinct};
 pub use self::csv::{csv, csv_text};
 pub use self::number::{Medium, Shown, fixed, significant};
