@@ -14,7 +14,7 @@ pub trait DampedEquations {
 }
 
 /// Least-squares problem whose equations are solved by themselves: dense ([`super::NormalEquations`]) or with groups of
-/// unknowns ([`super::TwoLevelEquations`]).
+/// unknowns (`TwoLevelEquations`).
 pub trait LeastSquares {
     type Estimate;
     type Equations: DampedEquations;

@@ -47,7 +47,7 @@ const INTRINSICS_PX: [[f64; 4]; 4] = [
     [527.4, 527.9, 321.2, 238.7],
 ];
 
-/// Camera model at this image size; `which` is the index in [`INTRINSICS_PX`].
+/// Camera model at this image size; `which` is the index in `INTRINSICS_PX`.
 pub fn camera_model(which: usize, lens: Lens, resolution_px: [usize; 2]) -> CameraModel {
     let [fx, fy, cx, cy] = INTRINSICS_PX[which];
     let distortion = match (lens, which) {
