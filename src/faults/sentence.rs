@@ -24,6 +24,18 @@ pub enum Severity {
     Error,
 }
 
+impl Severity {
+    /// Lowercase name, printed before a finding.
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::Good => "good",
+            Self::Note => "note",
+            Self::Warning => "warning",
+            Self::Error => "error",
+        }
+    }
+}
+
 /// Factors by which a wrong range setting scales measurements.
 const RANGE_FACTORS: [f64; 4] = [0.25, 0.5, 2.0, 4.0];
 
@@ -435,16 +447,4 @@ fn imu_scale(fault: &Fault) -> (String, String) {
         format!("calibrate the {sensor}'s scale (imu0's intrinsics in the rig), or check its driver")
     };
     (format!("the {sensor} measures {measured:.3} times the {quantity}"), remedy)
-}
-
-impl Severity {
-    /// Lowercase name, printed before a finding.
-    pub fn label(self) -> &'static str {
-        match self {
-            Self::Good => "good",
-            Self::Note => "note",
-            Self::Warning => "warning",
-            Self::Error => "error",
-        }
-    }
 }

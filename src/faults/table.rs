@@ -107,6 +107,21 @@ pub enum Area {
     Extrinsics,
 }
 
+impl Area {
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::Log => "log",
+            Self::Time => "time",
+            Self::Imu => "IMU",
+            Self::Motion => "motion",
+            Self::Encoders => "encoders",
+            Self::Images => "images",
+            Self::Intrinsics => "intrinsics",
+            Self::Extrinsics => "extrinsics",
+        }
+    }
+}
+
 /// Definition of a kind of fault.
 #[derive(Debug)]
 pub struct Row {
@@ -401,19 +416,4 @@ const fn names() -> [(FaultKind, &'static str); TABLE.len()] {
         number += 1;
     }
     names
-}
-
-impl Area {
-    pub fn label(self) -> &'static str {
-        match self {
-            Self::Log => "log",
-            Self::Time => "time",
-            Self::Imu => "IMU",
-            Self::Motion => "motion",
-            Self::Encoders => "encoders",
-            Self::Images => "images",
-            Self::Intrinsics => "intrinsics",
-            Self::Extrinsics => "extrinsics",
-        }
-    }
 }

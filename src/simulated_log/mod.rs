@@ -1,6 +1,6 @@
 //! Synthetic flights written as flight logs: rendered images, disturbances, planted faults.
 //!
-//! The motion and the measurements without images are those of [`simulation`](crate::simulation).
+//! [`simulation`](crate::simulation) has the motion and the measurements without images.
 
 mod disturbances;
 mod error;

@@ -11,8 +11,7 @@ use crate::sensors::{
     RequiredAccuracy, Rig,
 };
 
-/// A rig as a YAML file, with its chain in the classical parameterization. Numbers read back exactly;
-/// rotation matrices read back to within rounding.
+/// A rig as the text of [`RigFile::to_yaml`](super::RigFile::to_yaml).
 pub(super) fn yaml(rig: &Rig) -> String {
     let mut out = String::from("# T_a_b maps points from b to a; metres, radians, seconds.\n");
     line(&mut out, 0, "rig_version", "1");
