@@ -11,6 +11,7 @@ use crate::cli::estimation_arguments::EstimationArguments;
 use crate::cli::exit::ExitOutcome;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::prepared_log::prepared_log;
+use crate::cli::shared_arguments::seconds;
 use crate::cli::terminal::{Progress, notify, print, print_json};
 
 #[derive(Args, Clone, Debug)]
@@ -18,6 +19,9 @@ pub(crate) struct DiagnoseArguments {
     pub log: PathBuf,
     #[command(flatten)]
     pub estimation: EstimationArguments,
+    /// Processor time in seconds after which the trials end, as estimated for a common machine: the same trials on every one
+    #[arg(long, value_name = "SECONDS", default_value_t = session::TRIALS_S, value_parser = seconds)]
+    pub budget: f64,
     /// Print the diagnoses as JSON, with all causes that were tried with a gain.
     #[arg(long)]
     pub json: bool,
@@ -36,7 +40,7 @@ pub(crate) fn diagnose(arguments: &DiagnoseArguments) -> Result<ExitOutcome> {
     let (mut diagnoses, log_faults): (Vec<Diagnosis>, _) = (Vec::new(), LogFaults::default());
     for run in 0..plan.runs.len() {
         let progress = Progress::new();
-        diagnoses.extend(session::diagnose(&computation, run, &log_faults, &mut |ratio, label| {
+        diagnoses.extend(session::diagnose(&computation, run, &log_faults, arguments.budget, &mut |ratio, label| {
             progress.show(ratio, || label.to_owned());
             interrupt.control_flow()
         }));

@@ -31,7 +31,7 @@ mod result;
 #[cfg(test)]
 pub(crate) mod tests;
 
-pub use diagnosis::{LogFaults, diagnose};
+pub use diagnosis::{LogFaults, TRIALS_S, diagnose};
 pub use engine::{
     BreakpointHit, CalibrationErrors, CalibrationRequest, CalibrationRun, CalibrationRunError, Computation,
     FlightNoiseError, SnapshotUse, Stopwatch, calibrate, camera_rotations, check_log, compute, compute_until,

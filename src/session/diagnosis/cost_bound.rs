@@ -8,7 +8,7 @@ const COMPARED_AT: f64 = 0.6;
 /// Largest ratio of a trial's cost to the cost of the run itself.
 const WORSE_RATIO: f64 = 1.1;
 /// Smallest ratio of the gain of the best trial that another one must reach.
-const LEAST_GAIN: f64 = 0.2;
+pub(super) const LEAST_GAIN: f64 = 0.2;
 
 /// Largest cost of the steps up to one of them.
 #[derive(Clone, Debug)]
@@ -37,6 +37,23 @@ impl CostBound {
         (after < before).then_some(Self { largest: before - LEAST_GAIN * (before - after), ..bound })
     }
 
+    /// Lowers the bound by the best of some trials that have a window for as long as the run itself.
+    pub(super) fn tighten<'a>(
+        &mut self,
+        given: &[StepMisfit],
+        trials: impl Iterator<Item = (&'a ForkChanges, &'a [StepMisfit])>,
+    ) {
+        let tracked = |steps: &[StepMisfit]| steps[..self.steps].iter().filter(|step| step.tracking).count();
+        let is_whole = |steps: &[StepMisfit]| steps.len() >= self.steps && tracked(steps) >= tracked(given);
+        let compared = trials.filter(|(changes, steps)| acts_at_once(changes) && is_whole(steps));
+        let best = compared.filter_map(|(_, steps)| self.cost(steps)).min_by(f64::total_cmp);
+        if let (Some(before), Some(after)) = (self.cost(given), best)
+            && after < before
+        {
+            self.largest = self.largest.min(before - LEAST_GAIN * (before - after));
+        }
+    }
+
     fn at(given: &[StepMisfit], steps: usize) -> Option<Self> {
         let part = given.get(..steps)?;
         let from_ns = part.iter().find(|step| step.tracking)?.stamp_ns;
@@ -52,14 +69,25 @@ impl CostBound {
         (misfit.tracked > 0).then(|| Misfit { steps: misfit.tracked, ..misfit }.cost(&self.scale))
     }
 
-    /// True if a trial that has just computed its steps exceeds the bound. Only corrections of the measurements act at once
-    /// and are compared: estimated parameters and wider priors take time to converge.
+    /// True if a trial that has just computed its steps exceeds the bound. Only changes that act at once
+    /// are compared.
     pub(super) fn is_exceeded(&self, changes: &ForkChanges, steps: &[StepMisfit]) -> bool {
-        steps.len() == self.steps
-            && !changes.corrections.is_empty()
-            && changes.estimated.is_empty()
-            && self.cost(steps).is_some_and(|cost| cost > self.largest)
+        steps.len() == self.steps && self.is_above(changes, steps)
     }
+
+    /// The same for a trial that begins with steps of the run itself beyond those that are compared.
+    pub(super) fn was_exceeded(&self, changes: &ForkChanges, steps: &[StepMisfit]) -> bool {
+        steps.len() >= self.steps && self.is_above(changes, steps)
+    }
+
+    fn is_above(&self, changes: &ForkChanges, steps: &[StepMisfit]) -> bool {
+        acts_at_once(changes) && self.cost(steps).is_some_and(|cost| cost > self.largest)
+    }
+}
+
+/// True for corrections of the measurements; estimated parameters and wider priors take time to converge.
+pub(super) fn acts_at_once(changes: &ForkChanges) -> bool {
+    !changes.corrections.is_empty() && changes.estimated.is_empty()
 }
 
 #[cfg(test)]
@@ -102,6 +130,16 @@ mod tests {
 
     #[test]
     fn corrections_with_little_of_the_best_gain_are_not_computed_on() {
+        let (given, changes) = (steps(4.0, 20), [focal(), ForkChanges { chain_prior: 5.0, ..ForkChanges::default() }]);
+        let mut bound = CostBound::of_run(&given).unwrap();
+        let mut exceeded_by = |trial: &[StepMisfit], changes: &ForkChanges| {
+            bound.tighten(&given, [(changes, trial)].into_iter());
+            exceeded(&bound, &steps(3.8, 20), &focal())
+        };
+        // A trial that lost its window, and one that takes time to converge, are no bound.
+        let found =
+            [(25, 0), (20, 1), (20, 0)].map(|(window, change)| exceeded_by(&steps(0.1, window), &changes[change]));
+        assert_eq!(found, [false, false, true]);
         let (given, best) = (steps(4.0, 20), steps(0.1, 20));
         let bound = CostBound::of_best(&given, &best[..60]).unwrap();
         let found = [0.1, 1.0, 3.8].map(|length_px| exceeded(&bound, &steps(length_px, 20), &focal()));

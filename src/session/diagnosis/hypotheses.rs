@@ -1,5 +1,7 @@
 //! The causes that a diagnosis tries: each is a change of the run, with its number of parameters.
 
+use std::collections::BTreeMap;
+
 use super::axes::PlausibleAxes;
 use super::trial::DiagnosedRun;
 use crate::estimator::SensorParameters;
@@ -43,8 +45,8 @@ impl TrialHypothesis {
     }
 }
 
-/// Seconds over which a changing focal length is tried to change.
-pub(super) const ZOOM_S: [f64; 3] = [0.2, 1.0, 2.5];
+/// Seconds over which a changing focal length is tried to change at first.
+pub(super) const ZOOM_S: f64 = 1.0;
 /// Factors on the standard deviations of the chain.
 const CHAIN_FACTORS: [f64; 2] = [5.0, 25.0];
 
@@ -88,9 +90,19 @@ pub(super) fn changes_at(step: usize, first: &[TrialHypothesis]) -> Vec<TrialHyp
     let changes = first.iter().filter(|it| !matches!(it.cause, Chain | ImageFlip | ImuAxes | Intrinsics));
     let mut all: Vec<TrialHypothesis> = changes.map(|it| it.starting(step)).collect();
     for factor in FaultKind::Zoom.row().trials {
-        all.extend(ZOOM_S.map(|over_s| TrialHypothesis::zoom(*factor, over_s).starting(step)));
+        all.push(TrialHypothesis::zoom(*factor, ZOOM_S).starting(step));
     }
     all
+}
+
+/// Orders hypotheses so that each cause is tried with one value before any is tried with a second one.
+pub(super) fn each_cause_first(hypotheses: &mut [TrialHypothesis]) {
+    let mut counts: BTreeMap<(FaultKind, bool), usize> = BTreeMap::new();
+    hypotheses.sort_by_cached_key(|it| {
+        let count = counts.entry((it.cause, it.from.is_some())).or_default();
+        *count += 1;
+        *count
+    });
 }
 
 /// True if the run reads joint angles.

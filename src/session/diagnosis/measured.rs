@@ -83,9 +83,7 @@ fn hypotheses(run: &DiagnosedRun<'_>, fault: &Fault) -> Option<Vec<TrialHypothes
         (FaultKind::ImageFlip, _) => corrections(&[fault.kind], &[]),
         (FaultKind::FocalPieces, [_, _, _, factor]) => {
             // The time is that at which half of the change has been reached.
-            let zoom =
-                |over_s: f64| TrialHypothesis::zoom(*factor, over_s).starting(step_at(fault.values[2] - 0.5 * over_s));
-            ZOOM_S.map(zoom).to_vec()
+            vec![TrialHypothesis::zoom(*factor, ZOOM_S).starting(step_at(fault.values[2] - 0.5 * ZOOM_S))]
         }
         (FaultKind::GyroscopeAxes, _) => axes_hypotheses(&PlausibleAxes {
             gyroscope: fault.axes().into_iter().collect(),
@@ -147,8 +145,7 @@ mod tests {
         let rig = synthetic_tracks(&SyntheticOptions { duration_s: 0.1, ..SyntheticOptions::default() }).given_rig;
         let spec: RunSpec = spec.parse().unwrap();
         let interrupted = AtomicBool::new(false);
-        let run =
-            DiagnosedRun { rig: &rig, spec: &spec, camera_key: "cam0", inputs: Vec::new(), interrupted: &interrupted };
+        let run = DiagnosedRun::new(&rig, (&spec, "cam0"), Vec::new(), 1.0, &interrupted);
         let undoing = Undoing::of(&run, findings);
         (undoing.hypotheses.iter().map(|it| it.changes.to_string()).collect(), undoing.has_irreversible)
     }

@@ -2,6 +2,7 @@
 
 use super::hypotheses::TrialHypothesis;
 use super::ranking::RankedTrial;
+use super::scoring::Trials;
 use super::trial::{DiagnosedRun, TrialResult};
 use super::tuning::rounded;
 use crate::estimator::SensorParameters;
@@ -21,8 +22,8 @@ const NOISE_FACTORS: [f64; 2] = [1.1, 1e3];
 const STEPS_BESIDE: usize = 15;
 
 /// Hypotheses of the same kinds with values that the columns and residuals of the trials estimate.
-pub(super) fn refined(run: &DiagnosedRun<'_>, candidates: &[RankedTrial]) -> Vec<TrialHypothesis> {
-    let mut all = Vec::new();
+pub(super) fn refined(run: &DiagnosedRun<'_>, trials: &Trials) -> Vec<TrialHypothesis> {
+    let (mut all, candidates) = (Vec::new(), &trials.others);
     for candidate in candidates {
         let changes = &candidate.hypothesis.changes;
         if changes.estimated.contains(&SensorParameters::Timeshift) {
@@ -54,7 +55,7 @@ pub(super) fn refined(run: &DiagnosedRun<'_>, candidates: &[RankedTrial]) -> Vec
         candidates.iter().filter(|it| it.hypothesis.cause == FaultKind::EncoderNoise && it.hypothesis.from.is_none());
     let widest = noises
         .max_by(|one, other| one.hypothesis.changes.encoder_noise.total_cmp(&other.hypothesis.changes.encoder_noise));
-    if let Some(widest) = widest {
+    if let Some(widest) = widest.filter(|widest| trials.is_promising(widest)) {
         all.extend(offsets(run, &widest.result));
     }
     all

@@ -1,9 +1,10 @@
 //! Trials of one span on one scale.
 
+use super::cost_bound::LEAST_GAIN;
 use super::hypotheses::TrialHypothesis;
 use super::ranking::{RankedTrial, score};
 use super::trial::TrialResult;
-use crate::faults::FaultKind;
+use crate::faults::{Explanation as _, FaultKind};
 use crate::session::misfit::{Misfit, Scale};
 use crate::session::plan::ForkChanges;
 
@@ -16,6 +17,14 @@ const DEFAULT_SIGMA_PX: f64 = 0.25;
 pub(super) struct Trials {
     pub(super) given: RankedTrial,
     pub(super) others: Vec<RankedTrial>,
+}
+
+impl Trials {
+    /// True for a trial with an appreciable part of the gain of the best one: better values of the others explain no more.
+    pub(super) fn is_promising(&self, trial: &RankedTrial) -> bool {
+        let best = RankedTrial::best(&self.others).map_or(0.0, |best| self.given.score - best.score);
+        self.given.score - trial.score >= LEAST_GAIN * best
+    }
 }
 
 /// Trials on one scale: the observations and windows of the run itself, or of the trial with the most steps if the run has no

@@ -2,9 +2,10 @@
 
 use nalgebra::Vector3;
 
-use super::trial::{DiagnosedRun, TrialResult, TrialSpan};
+use super::trial::{DiagnosedRun, LATER_S, TrialSpan};
 use crate::geometry::ns_from_seconds;
 use crate::session::engine::{History, OwnedStepInput};
+use crate::session::misfit::StepMisfit;
 
 /// Time before the first window of a run, or before an onset, at which trials start, in seconds.
 const BEFORE_S: f64 = 2.0;
@@ -16,8 +17,6 @@ const LOST_SCREENED_S: f64 = 6.0;
 /// Ratio of these times for a rolling shutter, whose steps take several times longer, and for a window of more frames.
 const SHUTTER_RATIO: f64 = 0.45;
 const FRAMES: f64 = 16.0;
-/// Delay in seconds after the run's own first window, by which a trial must have one.
-const LATER_S: f64 = 1.5;
 /// Standard deviation of the specific force over a second from which on a vehicle moves, in m/s².
 const MOVING_M_PER_S2: f64 = 0.4;
 
@@ -26,10 +25,10 @@ const MOVING_M_PER_S2: f64 = 0.4;
 pub(super) fn screened_span(
     run: &DiagnosedRun<'_>,
     history: &History,
-    given: &TrialResult,
+    given: &[StepMisfit],
     onset: Option<usize>,
 ) -> Option<TrialSpan> {
-    let first_window = given.steps.iter().position(|step| step.tracking);
+    let first_window = given.iter().position(|step| step.tracking);
     let stamp_ns = |step: usize| run.inputs.get(step).map_or(0, |input| input.stamp_ns);
     let (anchor, length_s) = match onset.or(first_window) {
         Some(step) => (step, SCREENED_S),
@@ -49,7 +48,7 @@ pub(super) fn screened_span(
 }
 
 /// The same span with more seconds at its end.
-pub(super) fn confirmed_span(run: &DiagnosedRun<'_>, given: &TrialResult, span: &TrialSpan) -> TrialSpan {
+pub(super) fn confirmed_span(run: &DiagnosedRun<'_>, given: &[StepMisfit], span: &TrialSpan) -> TrialSpan {
     let length_s = BEFORE_S + CONFIRMED_S * speed_ratio(run, given);
     let from_ns = run.inputs.get(span.steps.start).map_or(0, |input| input.stamp_ns);
     let end = run.step_at(from_ns + ns_from_seconds(length_s));
@@ -57,9 +56,9 @@ pub(super) fn confirmed_span(run: &DiagnosedRun<'_>, given: &TrialResult, span: 
 }
 
 /// Ratio by which spans are shorter for runs with slow steps.
-fn speed_ratio(run: &DiagnosedRun<'_>, given: &TrialResult) -> f64 {
+fn speed_ratio(run: &DiagnosedRun<'_>, given: &[StepMisfit]) -> f64 {
     let shutter = run.spec.readout || run.rig.camera(run.camera_key).is_ok_and(|camera| camera.readout_s != 0.0);
-    let windows = given.steps.iter().filter(|step| step.tracking);
+    let windows = given.iter().filter(|step| step.tracking);
     let (count, frames) = windows.fold((0_usize, 0), |(count, frames), step| (count + 1, frames + step.frames));
     let mean = frames as f64 / count.max(1) as f64;
     let of_frames = if mean > FRAMES { FRAMES / mean } else { 1.0 };

@@ -13,19 +13,19 @@ const SPREADS: [[f64; 2]; 2] = [[0.94, 1.06], [0.6, 1.6]];
 /// The best change that begins at a step, at other steps around it.
 pub(super) fn moved(trials: &Trials) -> Vec<TrialHypothesis> {
     let later = trials.others.iter().filter(|it| it.hypothesis.from.is_some());
-    let Some(best) = RankedTrial::best(later) else { return Vec::new() };
+    let Some(best) = RankedTrial::best(later).filter(|best| trials.is_promising(best)) else { return Vec::new() };
     let hypothesis = &best.hypothesis;
     let steps = MOVES.map(|by| hypothesis.from.and_then(|from| from.checked_add_signed(by)));
     steps.into_iter().flatten().map(|step| TrialHypothesis { from: Some(step), ..hypothesis.clone() }).collect()
 }
 
 /// Hypotheses with values around the best offset of a joint and around the best zoom.
-pub(super) fn tuned(candidates: &[RankedTrial]) -> Vec<TrialHypothesis> {
+pub(super) fn tuned(trials: &Trials) -> Vec<TrialHypothesis> {
+    let candidates = &trials.others;
     let mut all = Vec::new();
     for cause in [FaultKind::JointOffset, FaultKind::Zoom] {
-        let Some(best) = RankedTrial::best(candidates.iter().filter(|it| it.hypothesis.cause == cause)) else {
-            continue;
-        };
+        let best = RankedTrial::best(candidates.iter().filter(|it| it.hypothesis.cause == cause));
+        let Some(best) = best.filter(|best| trials.is_promising(best)) else { continue };
         let hypothesis = &best.hypothesis;
         let [fault] = hypothesis.changes.corrections.as_slice() else { continue };
         for (number, (value, spread)) in fault.values.iter().zip(&SPREADS).enumerate() {

@@ -8,7 +8,7 @@ use std::thread::{Builder, JoinHandle};
 use parking_lot::Mutex;
 use rayon::ThreadPoolBuilder;
 
-use crate::session::diagnosis::{LogFaults, diagnose};
+use crate::session::diagnosis::{LogFaults, TRIALS_S, diagnose};
 use crate::session::engine::Computation;
 use crate::session::plan::SessionError;
 use crate::session::record::Diagnosis;
@@ -51,7 +51,7 @@ impl BackgroundDiagnosis {
             };
             let checked = computation.recording().check.as_deref();
             let faults = checked.map_or_else(LogFaults::default, |findings| LogFaults::among(findings));
-            if let Some(found) = diagnose(&computation, run, &faults, &mut on_progress) {
+            if let Some(found) = diagnose(&computation, run, &faults, TRIALS_S, &mut on_progress) {
                 store(found);
             }
         };

@@ -112,7 +112,9 @@ pub struct Diagnosis {
     pub trials: usize,
     /// True if it was interrupted before the last trial.
     pub interrupted: bool,
-    /// Keys of the causes that an interrupt left untried.
+    /// Processor time in seconds after which the trials ended before the last one, `None` if they were completed or interrupted.
+    pub ended_after_s: Option<f64>,
+    /// Keys of the causes that an interrupt or the end of the processor time left untried.
     #[serde(serialize_with = "keys", skip_serializing_if = "Vec::is_empty")]
     pub not_tried: Vec<FaultKind>,
 }
@@ -159,12 +161,11 @@ impl fmt::Display for Diagnosis {
             }
         }
         if let Some((from_s, to_s)) = self.span_s {
-            let ended = if self.interrupted {
-                "; stopped early"
-            } else if self.measured {
-                ", for the faults that the check measures"
-            } else {
-                ""
+            let ended = match self.ended_after_s {
+                _ if self.interrupted => "; stopped early".to_owned(),
+                Some(after_s) => format!("; ended after about {after_s:.0} s of processor time{}", self.left_out()),
+                None if self.measured => ", for the faults that the check measures".to_owned(),
+                None => String::new(),
             };
             writeln!(out, "  tried        {} changes from {from_s:.2} to {to_s:.2} s{ended}", self.trials)?;
         }
@@ -190,13 +191,22 @@ impl Diagnosis {
         }
         let is_known = matches!(self.verdict, DiagnosisVerdict::Cause | DiagnosisVerdict::Several);
         let known = if is_known { self.headline_of_all() } else { "no cause found".to_owned() };
-        let not_tried: Vec<String> = self.not_tried.iter().map(|cause| cause.name().replace('_', " ")).collect();
-        let open = match not_tried.as_slice() {
-            [] if self.trials == 0 => "any cause".to_owned(),
-            [] => "refined values".to_owned(),
-            causes => causes.join(", "),
+        let open = match self.not_tried_in_words() {
+            open if !open.is_empty() => open,
+            _ if self.trials == 0 => "any cause".to_owned(),
+            _ => "refined values".to_owned(),
         };
         format!("stopped; so far {known}; not tried: {open}")
+    }
+
+    fn not_tried_in_words(&self) -> String {
+        self.not_tried.iter().map(|cause| cause.name().replace('_', " ")).collect::<Vec<_>>().join(", ")
+    }
+
+    /// Causes that were left out, as the end of a sentence.
+    fn left_out(&self) -> String {
+        let open = self.not_tried_in_words();
+        if open.is_empty() { ", with fewer values".to_owned() } else { format!("; not tried: {open}") }
     }
 
     fn headline_of_all(&self) -> String {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::faults::{Area, Fault, FaultKind, Severity, correct_joint_angles};
 use crate::log_check::{Basis, Finding, FindingInterval};
 use crate::sensors::Rig;
-use crate::session::diagnosis::diagnose_run;
+use crate::session::diagnosis::{TRIALS_S, diagnose_run};
 use crate::session::engine::input_of;
 use crate::session::engine::{History, OwnedStepInput, RunEngine, estimator_config};
 use crate::session::plan::RunSpec;
@@ -24,12 +24,12 @@ fn diagnosed(
     input_fault: impl Fn(&mut OwnedStepInput, &Rig),
     measured: &[Fault],
 ) -> Diagnosis {
-    diagnosed_until(f64::INFINITY, duration_s, rig_fault, input_fault, measured)
+    diagnosed_until((f64::INFINITY, TRIALS_S), duration_s, rig_fault, input_fault, measured)
 }
 
-/// The same, stopped when the progress exceeds a ratio.
+/// The same, stopped when the progress exceeds a ratio, with an amount of processor time in seconds.
 fn diagnosed_until(
-    stop_at: f64,
+    (stop_at, trials_s): (f64, f64),
     duration_s: f64,
     rig_fault: impl Fn(&mut Rig),
     input_fault: impl Fn(&mut OwnedStepInput, &Rig),
@@ -54,7 +54,7 @@ fn diagnosed_until(
         record.push(estimated_step(&mut engine, &input));
     }
     let findings = || measured.iter().map(error_of).collect();
-    diagnose_run(&rig, &record, &history, &findings, &mut |ratio, _| {
+    diagnose_run(&rig, &record, &history, &findings, trials_s, &mut |ratio, _| {
         if ratio > stop_at { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     })
 }
@@ -134,13 +134,27 @@ fn an_offset_of_a_joint_is_named_with_its_time() {
 
 #[test]
 fn a_diagnosis_that_is_stopped_says_what_is_open() {
-    let found = diagnosed_until(0.0, 5.0, |_| (), jump, &[]);
+    let found = diagnosed_until((0.0, TRIALS_S), 5.0, |_| (), jump, &[]);
     assert!(found.interrupted && found.trials == 0, "{found}");
     assert_eq!(found.headline(), "stopped; so far no cause found; not tried: any cause");
-    let found = diagnosed_until(0.2, 5.0, |_| (), jump, &[]);
+    let found = diagnosed_until((0.06, TRIALS_S), 5.0, |_| (), jump, &[]);
     assert!(found.interrupted && found.trials > 0 && !found.not_tried.is_empty(), "{found}");
     let headline = found.headline();
     assert!(headline.starts_with("stopped; so far ") && headline.contains("; not tried: "), "{headline}");
+}
+
+#[test]
+fn a_diagnosis_ends_with_its_processor_time_and_says_what_is_open() {
+    let found = |trials_s: f64| diagnosed_until((f64::INFINITY, trials_s), 5.0, |_| (), jump, &[]);
+    let none = found(0.0);
+    assert_eq!((none.trials, none.ended_after_s, none.interrupted), (0, Some(0.0), false), "{none}");
+    assert_eq!(none.verdict, DiagnosisVerdict::Unexplained);
+    assert!(none.to_string().contains("; ended after about 0 s of processor time; not tried: focal length"), "{none}");
+    let some = found(2.0);
+    assert!(some.trials > 0 && some.ended_after_s == Some(2.0), "{some}");
+    assert!(some.to_string().contains("; ended after about 2 s of processor time"), "{some}");
+    let all = found(1e3);
+    assert!(all.trials > some.trials && all.ended_after_s.is_none() && all.not_tried.is_empty(), "{all}");
 }
 
 #[test]
@@ -164,7 +178,7 @@ fn a_run_without_steps_has_no_cause() {
     let rig = synthetic_tracks(&SyntheticOptions { duration_s: 0.2, ..SyntheticOptions::default() }).given_rig;
     let record = RunRecord::new(RunSpec::default(), "cam0".to_owned());
     let history = History::new(usize::MAX);
-    let found = diagnose_run(&rig, &record, &history, &Vec::new, &mut |_, _| ControlFlow::Continue(()));
+    let found = diagnose_run(&rig, &record, &history, &Vec::new, TRIALS_S, &mut |_, _| ControlFlow::Continue(()));
     assert_eq!(found.verdict, DiagnosisVerdict::NoSteps);
     assert!(found.to_string().contains("no image reached the estimator"), "{found}");
 }

@@ -151,6 +151,7 @@ mod tests {
             causes: vec![cause],
             trials: 40,
             interrupted: false,
+            ended_after_s: None,
             not_tried: Vec::new(),
         }
     }
