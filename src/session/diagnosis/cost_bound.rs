@@ -33,8 +33,8 @@ impl CostBound {
     /// gains nothing.
     pub(super) fn of_best(given: &[StepMisfit], best: &[StepMisfit]) -> Option<Self> {
         let bound = Self::at(given, best.len())?;
-        let [before, after] = [bound.cost(given)?, bound.cost(best)?];
-        (after < before).then_some(Self { largest: before - LEAST_GAIN * (before - after), ..bound })
+        let largest = least_gain(bound.cost(given)?, bound.cost(best)?)?;
+        Some(Self { largest, ..bound })
     }
 
     /// Lowers the bound by the best of some trials that have a window for as long as the run itself.
@@ -47,10 +47,8 @@ impl CostBound {
         let is_whole = |steps: &[StepMisfit]| steps.len() >= self.steps && tracked(steps) >= tracked(given);
         let compared = trials.filter(|(changes, steps)| acts_at_once(changes) && is_whole(steps));
         let best = compared.filter_map(|(_, steps)| self.cost(steps)).min_by(f64::total_cmp);
-        if let (Some(before), Some(after)) = (self.cost(given), best)
-            && after < before
-        {
-            self.largest = self.largest.min(before - LEAST_GAIN * (before - after));
+        if let (Some(before), Some(after)) = (self.cost(given), best) {
+            self.largest = self.largest.min(least_gain(before, after).unwrap_or(f64::INFINITY));
         }
     }
 
@@ -69,8 +67,7 @@ impl CostBound {
         (misfit.tracked > 0).then(|| Misfit { steps: misfit.tracked, ..misfit }.cost(&self.scale))
     }
 
-    /// True if a trial that has just computed its steps exceeds the bound. Only changes that act at once
-    /// are compared.
+    /// True if a trial that has just computed the compared steps exceeds the bound. Only changes that act at once are compared.
     pub(super) fn is_exceeded(&self, changes: &ForkChanges, steps: &[StepMisfit]) -> bool {
         steps.len() == self.steps && self.is_above(changes, steps)
     }
@@ -83,6 +80,11 @@ impl CostBound {
     fn is_above(&self, changes: &ForkChanges, steps: &[StepMisfit]) -> bool {
         acts_at_once(changes) && self.cost(steps).is_some_and(|cost| cost > self.largest)
     }
+}
+
+/// Largest cost with an appreciable part of the gain of the best trial; `None` if that gains nothing.
+fn least_gain(before: f64, after: f64) -> Option<f64> {
+    (after < before).then_some(before - LEAST_GAIN * (before - after))
 }
 
 /// True for corrections of the measurements; estimated parameters and wider priors take time to converge.

@@ -18,8 +18,8 @@ use crate::session::misfit::StepMisfit;
 use crate::session::plan::{ForkChanges, RunSpec};
 use crate::session::record::RunRecord;
 
-/// Delay in seconds after the run's own first window, by which a trial must have one, and time without one after which it is
-/// not computed on.
+/// Delay in seconds after the run's own first window, by which a trial must have one, and time without one after which a trial
+/// is not computed any more.
 pub(super) const LATER_S: f64 = 1.5;
 
 /// The run to be diagnosed.
