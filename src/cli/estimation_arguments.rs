@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use clap::Args;
 use dcvins::sensors::LeverArm;
-use dcvins::session::{ParameterizationChoice, RunSpec, SessionRequest, StopFlag, TrajectorySource, TrajectorySpec};
+use dcvins::session::{ParameterizationChoice, RunSpec, SessionRequest, TrajectorySource, TrajectorySpec};
 use dcvins::text::{Named as _, key_list};
 
 use crate::cli::shared_arguments::{LimitArguments, PriorArguments, seconds};
@@ -48,9 +48,6 @@ pub(crate) struct EstimationArguments {
     pub prior: PriorArguments,
     #[command(flatten)]
     pub limits: LimitArguments,
-    /// True for a log that another program is writing.
-    #[arg(skip)]
-    pub follow: bool,
 }
 
 fn run_help() -> String {
@@ -119,7 +116,7 @@ impl EstimationArguments {
             start_s: self.start,
             duration_s: self.duration,
             limits: self.limits.limits(),
-            following: self.follow.then(StopFlag::default),
+            following: None,
         })
     }
 }

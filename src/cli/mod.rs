@@ -14,6 +14,7 @@ mod exit;
 mod export;
 #[cfg(feature = "gui")]
 mod figure_arguments;
+mod follow_arguments;
 mod generate;
 mod history;
 mod interrupt;

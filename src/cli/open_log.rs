@@ -1,7 +1,7 @@
 //! Opening of logs, sessions and recordings for the window.
 
 use std::ops::ControlFlow;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -11,7 +11,7 @@ use dcvins::export::{
 };
 use dcvins::files::LogLimits;
 use dcvins::flight_log::convert::SourceKind;
-use dcvins::flight_log::{FlightLog, LogError, missing_sensors, rig_candidates};
+use dcvins::flight_log::{FlightLog, FollowOptions, LogError, missing_sensors, rig_candidates};
 use dcvins::gui::app::{OpenFailure, OpenProgress, OpenRequest, OpenedLog, RigQuestion};
 use dcvins::session::{Session, SessionError, SessionPlan, SessionRequest};
 use dcvins::text::log_name;
@@ -32,11 +32,13 @@ const SHOWN_NOTES: usize = 3;
 pub(crate) fn open_log(
     request: &OpenRequest,
     estimation: &EstimationArguments,
+    following: Option<&(PathBuf, FollowOptions)>,
     progress: &mut dyn FnMut(OpenProgress) -> ControlFlow<()>,
 ) -> Result<OpenedLog, OpenFailure> {
     let limits = estimation.limits.limits();
-    if estimation.follow {
-        wait_for_file(&request.sources, progress)?;
+    let following = following.filter(|(path, _)| request.sources.first() == Some(path));
+    if let Some((path, options)) = following {
+        wait_for_file(path, options, progress)?;
     }
     let sources = LogSources::gather(&request.sources, &limits).map_err(|error| failure(&error))?;
     let cache = converted_logs();
@@ -45,7 +47,7 @@ pub(crate) fn open_log(
         let saved = read_session(&sources.main).map_err(|error| problem(error.to_string()))?;
         let saved =
             prepare_session(saved, cache.as_ref().map_err(|reason| *reason), &limits, &mut |of, stage, ratio| {
-                progress(OpenProgress { text: stage_text(stage, of), ratio })
+                progress(OpenProgress { text: stage_text(stage, of), ratio: Some(ratio) })
             });
         let saved = saved.map_err(|error| failure(&error))?;
         let mut session = open_session(&saved, &sources.main).map_err(|error| problem(error.to_string()))?;
@@ -54,7 +56,7 @@ pub(crate) fn open_log(
     }
     let sources = LogSources { rig: request.rig.clone().or(sources.rig), ..sources };
     let prepared = prepare_log(&sources, cache.as_ref().map_err(|reason| *reason), &limits, &mut |stage, ratio| {
-        progress(OpenProgress { text: stage_text(stage, &sources), ratio })
+        progress(OpenProgress { text: stage_text(stage, &sources), ratio: Some(ratio) })
     });
     let prepared = prepared.map_err(|error| failure(&error))?;
     let of_recording = cache.as_ref().map_or_else(|_| Vec::new(), |cache| cache.sources_of(&prepared.log));
@@ -65,6 +67,7 @@ pub(crate) fn open_log(
         recording: of_recording.clone(),
         rig_path: prepared.rig.clone().or_else(|| estimation.rig.clone()).or(beside),
         ground_truth_path: prepared.ground_truth.clone().or_else(|| estimation.ground_truth.clone()),
+        following: following.map(|(_, options)| options.clone()),
         ..estimation.request(prepared.log.clone()).map_err(|error| OpenFailure::Problem(error.to_string()))?
     };
     if session_request.rig_path.is_none() && sources.kind == Some(SourceKind::Video) {
@@ -74,7 +77,7 @@ pub(crate) fn open_log(
     let started = SessionPlan::open(&session_request).and_then(|plan| {
         let mut session = Session::start(plan)?;
         // A check needs the complete log.
-        if !estimation.follow {
+        if following.is_none() {
             check(&mut session)?;
         }
         Ok(session)
@@ -93,15 +96,24 @@ pub(crate) fn open_log(
     }
 }
 
-/// Waits until the first file of a log that will be written is there.
+/// Waits until the file of a log that will be written is there.
 fn wait_for_file(
-    sources: &[PathBuf],
+    path: &Path,
+    options: &FollowOptions,
     progress: &mut dyn FnMut(OpenProgress) -> ControlFlow<()>,
 ) -> Result<(), OpenFailure> {
-    let Some(path) = sources.first() else { return Ok(()) };
     while path.metadata().is_ok_and(|metadata| metadata.len() == 0) || !path.exists() {
-        let text = format!("Waiting for {}", log_name(path));
-        if progress(OpenProgress { text, ratio: 0.0 }).is_break() {
+        let text = match &options.reception {
+            None => format!("Waiting for {}", log_name(path)),
+            Some(reception) if reception.is_over() => {
+                return Err(OpenFailure::Problem(reception.events().join("\n")));
+            }
+            Some(reception) => match reception.problem() {
+                Some(problem) => format!("Waiting for {} ({problem})", reception.address()),
+                None => format!("Waiting for the topics of {}", reception.address()),
+            },
+        };
+        if progress(OpenProgress { text, ratio: None }).is_break() {
             return Err(OpenFailure::Cancelled);
         }
         std::thread::sleep(FILE_POLL);

@@ -6,14 +6,16 @@ use std::sync::Arc;
 use anyhow::{Result, bail};
 use clap::Args;
 use dcvins::export::{self, RunFileOptions};
+use dcvins::flight_log::live::{LiveReceiver, Received};
 use dcvins::geometry::seconds_from_ns;
 use dcvins::session::breakpoints::Condition;
-use dcvins::session::{BreakpointHit, Recording, RunRecord, RunSummary, SessionPlan, SessionRequest, StopFlag};
-use dcvins::text::log_name;
+use dcvins::session::{BreakpointHit, Recording, RunRecord, RunSummary, SessionPlan, SessionRequest};
+use dcvins::text::{counted, log_name};
 
 use crate::cli::compute::{Delay, compute, compute_following, compute_until};
 use crate::cli::estimation_arguments::EstimationArguments;
 use crate::cli::exit::ExitOutcome;
+use crate::cli::follow_arguments::{FollowArguments, FollowedLog};
 use crate::cli::interrupt::Interrupt;
 use crate::cli::log_checking::beside_check;
 use crate::cli::prepared_log::prepared_log;
@@ -23,7 +25,8 @@ use crate::cli::terminal::{Progress, notify, print, print_json};
 
 #[derive(Args, Clone, Debug)]
 pub(crate) struct RunArguments {
-    /// The log, or a recording that is converted into the cache folder first.
+    /// The log, a recording that is converted into the cache folder first, or the address of a Foxglove WebSocket server,
+    /// ws://HOST:PORT, whose messages are recorded and followed.
     pub log: PathBuf,
     /// Folder for the files; each run gets a sub-folder with its name.
     #[arg(short = 'o', long, visible_alias = "output", value_name = "DIR")]
@@ -34,12 +37,10 @@ pub(crate) struct RunArguments {
     pub cache: CacheArguments,
     /// Stop when this condition becomes true in a run, as in "rank < 18 or features < 40", write the files up to that
     /// step and print the values; docs/manual.md lists the quantities.
-    #[arg(long = "break", value_name = "CONDITION", value_parser = condition)]
+    #[arg(long = "break", value_name = "CONDITION", value_parser = condition, conflicts_with = "follow")]
     pub break_at: Option<Condition>,
-    /// Follow a log that another program is writing: the run begins with its first seconds and ends with its footer, half a
-    /// minute after the last message, or at Ctrl+C.
-    #[arg(long, conflicts_with_all = ["break_at", "start", "duration"])]
-    pub follow: bool,
+    #[command(flatten)]
+    pub follow: FollowArguments,
     /// Omit measured times from frames.csv and summary.json, so that two runs give the same bytes in every file.
     #[arg(long)]
     pub no_timing: bool,
@@ -71,15 +72,16 @@ const SUMMARY_BUDGET_BYTES: usize = 16 << 20;
 
 pub(crate) fn run(arguments: &RunArguments) -> Result<ExitOutcome> {
     let interrupt = Interrupt::watch()?;
-    let (log, estimation) = if arguments.follow {
-        (arguments.log.clone(), arguments.estimation.clone())
+    let mut followed = begin_following(arguments, &interrupt)?;
+    let (log, estimation) = if let Some(followed) = &followed {
+        (followed.log.clone(), arguments.estimation.clone())
     } else {
         prepared_log(std::slice::from_ref(&arguments.log), &arguments.estimation)?
     };
     let arguments = &RunArguments { log, estimation, ..arguments.clone() };
     let request = arguments.estimation.request(arguments.log.clone())?;
-    let following = arguments.follow.then(|| StopFlag(interrupt.flag()));
-    let plan = SessionPlan::open(&SessionRequest { following, ..request.clone() })?;
+    let opened = || Ok(SessionPlan::open(&request)?);
+    let plan = followed.as_ref().map_or_else(opened, |followed| followed.plan(&request))?;
     let labels: Vec<&str> = plan.runs.iter().map(|(spec, _)| spec.label.as_str()).collect();
     export::check_run_folders(&arguments.out, &labels, &arguments.log, arguments.force)?;
     // Complete steps are needed for results.mcap and for the conditions of `--break`; all other files need only
@@ -91,8 +93,8 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitOutcome> {
         Some(condition) => compute_until(&plan, condition),
         None => Ok((compute(&plan)?.into_recording(), None)),
     };
-    let (recording, hit) = if arguments.follow {
-        (follow(arguments, &plan, &request)?, None)
+    let (recording, hit) = if let Some(followed) = &mut followed {
+        (follow(arguments, &plan, &request, followed)?, None)
     } else if arguments.no_check {
         estimate()?
     } else {
@@ -167,10 +169,38 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitOutcome> {
     })
 }
 
+/// Begins to follow the log of the command, a file or the messages of a server; `None` for a complete log.
+fn begin_following(arguments: &RunArguments, interrupt: &Interrupt) -> Result<Option<FollowedLog>> {
+    if !arguments.follow.applies_to(&arguments.log) {
+        return Ok(None);
+    }
+    let followed =
+        arguments.follow.open(&arguments.log, &arguments.estimation, &arguments.out, interrupt.flag(), true)?;
+    if followed.receiver.is_some() {
+        if arguments.break_at.is_some() {
+            bail!("--break needs a complete log: use it on the recording of {}", arguments.log.display());
+        }
+        if arguments.estimation.rig.is_none() {
+            bail!("a server has no rig: name it with --rig FILE ('dcvins rig new' writes one from a recording)");
+        }
+    }
+    Ok(Some(followed))
+}
+
 /// Runs on a log while it is being written, then checks the complete log.
-fn follow(arguments: &RunArguments, plan: &SessionPlan, request: &SessionRequest) -> Result<Recording> {
+fn follow(
+    arguments: &RunArguments,
+    plan: &SessionPlan,
+    request: &SessionRequest,
+    followed: &mut FollowedLog,
+) -> Result<Recording> {
     let mut delay = Delay::default();
     let computation = compute_following(plan, &mut delay)?;
+    if let Some(receiver) = &mut followed.receiver {
+        receiver.finish();
+        notify(&received(receiver));
+        receiver.reception().events().iter().for_each(|event| notify(&format!("dcvins: {event}")));
+    }
     if let Some(warning) = plan.log.end_warning() {
         notify(&format!("dcvins: {}", warning.message));
     }
@@ -184,6 +214,15 @@ fn follow(arguments: &RunArguments, plan: &SessionPlan, request: &SessionRequest
     let _progress = Progress::spinner("checking the log");
     let checked = export::check_log(arguments.cache.cache().as_ref(), &complete.log, &complete.rig);
     Ok(Recording { check: Some(Arc::new(checked.findings)), ..recording })
+}
+
+/// Notice about what was received.
+fn received(receiver: &LiveReceiver) -> String {
+    let Received { messages, bytes, connections } = receiver.reception().received();
+    let (address, recording) = (receiver.reception().address(), receiver.recording().display());
+    let megabytes = bytes as f64 * 1e-6;
+    let connections = counted(connections as usize, "connection");
+    format!("dcvins: {messages} messages ({megabytes:.1} MB) of {address} over {connections}, recorded in {recording}")
 }
 
 /// Notice about the computed part of an interrupted command.

@@ -5,10 +5,12 @@ use std::path::PathBuf;
 use clap::Args;
 
 use crate::cli::estimation_arguments::EstimationArguments;
+use crate::cli::follow_arguments::FollowArguments;
 
 #[derive(Args, Clone, Debug, Default)]
 pub(crate) struct ViewArguments {
-    /// The log, a saved session or the folder of a study; or a recording that 'dcvins convert' reads, which is converted
+    /// The log, a saved session or the folder of a study; the address of a Foxglove WebSocket server, ws://HOST:PORT, whose
+    /// messages are recorded and shown meanwhile; or a recording that 'dcvins convert' reads, which is converted
     /// into the cache folder first. Several files form one log: a video and the log of its autopilot, the parts of a
     /// split bag, and a rig. Without one the window lists the sample logs and recent files.
     #[arg(value_name = "SOURCE")]
@@ -17,11 +19,10 @@ pub(crate) struct ViewArguments {
     #[arg(short = 'o', long, visible_alias = "output", value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Start with the tour: six steps on the log, or on the sample flight without a log.
-    #[arg(long)]
+    #[arg(long, conflicts_with = "follow")]
     pub tour: bool,
-    /// Follow a log that another program is writing: steps appear as it grows. The log is not checked meanwhile.
-    #[arg(long, conflicts_with_all = ["tour", "start", "duration"])]
-    pub follow: bool,
+    #[command(flatten)]
+    pub follow: FollowArguments,
     #[command(flatten)]
     pub estimation: EstimationArguments,
 }
@@ -40,7 +41,7 @@ mod window {
     use std::path::{Path, PathBuf};
     use std::sync::Arc;
 
-    use anyhow::Result;
+    use anyhow::{Result, bail};
     use dcvins::desktop::Machine;
     use dcvins::export::{
         self, LogSources, PANEL_NAMES, RunFileOptions, ScreenshotOptions, draw_panel, is_session, read_session,
@@ -68,9 +69,15 @@ mod window {
         // Errors of the sources, of a log or of its rig are reported here, before a window opens. A recording is converted
         // in the window, with its progress; a missing rig is asked for there.
         let given = arguments.sources.first().map(PathBuf::as_path);
+        let followed = given.filter(|source| arguments.follow.applies_to(source)).map(|source| {
+            let folder = Path::new("dcvins-output");
+            arguments.follow.open(source, &arguments.estimation, folder, Arc::default(), false)
+        });
+        let followed = followed.transpose()?;
+        let given = followed.as_ref().map_or(given, |followed| Some(&followed.log));
         let alone = given.filter(|_| arguments.sources.len() == 1);
         let study = alone.filter(|path| is_study(path)).map(OpenedStudy::read).transpose()?.map(Arc::new);
-        if study.is_none() && given.is_some() && !arguments.follow {
+        if study.is_none() && given.is_some() && followed.is_none() {
             let sources = LogSources::gather(&arguments.sources, &arguments.estimation.limits.limits())?;
             if is_session(&sources.main) {
                 arguments.estimation.check_for_session()?;
@@ -79,8 +86,10 @@ mod window {
                 check_log(&sources, &arguments.estimation)?;
             }
         }
-        let estimation = EstimationArguments { follow: arguments.follow, ..arguments.estimation.clone() };
-        let open_log: OpenLog = Arc::new(move |request, progress| open_log(request, &estimation, progress));
+        let estimation = arguments.estimation.clone();
+        let following = followed.as_ref().map(|followed| (followed.log.clone(), followed.options.clone()));
+        let open_log: OpenLog =
+            Arc::new(move |request, progress| open_log(request, &estimation, following.as_ref(), progress));
         let first_study = Mutex::new(study.clone().zip(given.map(Path::to_owned)));
         let open_study = move |path: &Path| {
             // The study of the command line is already read.
@@ -92,7 +101,8 @@ mod window {
             let opened = is_study(path).then(|| OpenedStudy::read(path));
             opened.map(|opened| opened.map(|study| shown(Arc::new(study))).map_err(|error| error.to_string()))
         };
-        let sources = arguments.sources.clone();
+        let sources =
+            followed.as_ref().map_or_else(|| arguments.sources.clone(), |followed| vec![followed.log.clone()]);
         let options = WindowOptions {
             log: None,
             request: given.is_some().then_some(OpenRequest { sources, rig: None }),
@@ -104,6 +114,9 @@ mod window {
         };
         match (run_window(options), &study, alone) {
             (Err(WindowError::NoDisplay), Some(study), _) => write_study(study, arguments.out.as_deref()),
+            (Err(WindowError::NoDisplay), None, _) if followed.as_ref().is_some_and(|it| it.receiver.is_some()) => {
+                bail!("there is no display: use 'dcvins run {}'", arguments.sources[0].display())
+            }
             (Err(WindowError::NoDisplay), None, _) if given.is_some() => without_display(arguments),
             (result, ..) => Ok(result?),
         }

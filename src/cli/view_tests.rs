@@ -21,7 +21,8 @@ type Window = Harness<'static, App>;
 
 /// The window of the program on a machine whose files are in one folder.
 fn window(folder: &Path) -> Window {
-    let open: OpenLog = Arc::new(|request, progress| open_log(request, &EstimationArguments::default(), progress));
+    let open: OpenLog =
+        Arc::new(|request, progress| open_log(request, &EstimationArguments::default(), None, progress));
     let app = App::new(open, Arc::new(Machine::in_folder(folder)), ThemeName::Light);
     let mut harness =
         Harness::builder().with_size([1920.0, 1080.0]).build_ui_state(|ui, app: &mut App| app.ui(ui), app);

@@ -5,10 +5,12 @@
 pub(crate) mod container;
 pub mod convert;
 mod error;
+mod excerpt;
 pub(crate) mod grey_levels;
 pub(crate) mod images;
 pub(crate) mod imu;
 pub mod joints;
+pub mod live;
 pub(crate) mod log;
 pub(crate) mod messages;
 mod rig;
@@ -22,9 +24,10 @@ mod warning;
 mod writer;
 
 pub use self::error::LogError;
+pub use self::excerpt::{ExcerptReport, write_excerpt};
 pub use self::images::reader::ImageReader;
 pub use self::log::FlightLog;
-pub use self::log::following::LogEnd;
+pub use self::log::following::{FollowOptions, LogEnd};
 pub use self::log::topic_info::TopicInfo;
 pub use self::messages::MessageKind;
 pub use self::rig::template as rig_template;
@@ -39,7 +42,6 @@ pub use self::stream::{
 pub use self::trajectory::geodesy::Geodetic;
 pub use self::trajectory::{BATCH_REFERENCE, RecordedPose, is_batch_reference, read_trajectory_file};
 pub use self::warning::{LogWarning, Magnitude, WarningKind};
-pub use self::writer::excerpt::{ExcerptReport, write_excerpt};
 pub use self::writer::{
     CircleAnnotation, LinesAnnotation, LogCompression, LogLevel, LogWriter, LogWriterOptions, MessageTimes,
     MessageType, NamedTransform, Odometry, Rgba,

@@ -43,6 +43,10 @@ pub enum WarningKind {
     UnreachableAttitude,
     /// Attitudes of the gimbal without one of the vehicle.
     NoVehicleAttitude,
+    /// Interruptions of the connection to a vehicle in flight, and messages that could not be recorded.
+    Reception,
+    /// Images that are left out because the run is too far behind a vehicle in flight.
+    LeftOut,
 }
 
 impl WarningKind {
@@ -56,7 +60,8 @@ impl WarningKind {
             | Self::ImageUnreadable
             | Self::NoJointAngles
             | Self::ImageBeforeImu
-            | Self::ImageAfterImu => "images",
+            | Self::ImageAfterImu
+            | Self::LeftOut => "images",
             Self::DamagedChunk => "chunks",
             Self::UnreachableAttitude | Self::NoVehicleAttitude => "intervals",
             _ => "warnings",

@@ -41,8 +41,7 @@ pub use misfit::AgreementValue;
 pub use plan::{
     DEFAULT_MEMORY_BUDGET_BYTES, EstimatorTuning, FORK_PARAMETERIZATIONS, FlightPrior, FlightSigmas, ForkChanges,
     ForkError, LoadedPositions, LoadedTrajectory, MAX_RUNS, MAX_TRAJECTORIES, ParameterizationChoice, RunSpec,
-    RunSpecError, SessionError, SessionPlan, SessionRequest, StopFlag, TrajectorySource, TrajectorySpec,
-    TrajectorySpecError,
+    RunSpecError, SessionError, SessionPlan, SessionRequest, TrajectorySource, TrajectorySpec, TrajectorySpecError,
 };
 pub use playback::{
     Command, Cursor, DiagnosisProgress, FrameImage, Marker, Markers, MoveOutcome, Moved, PlaybackSpeed,

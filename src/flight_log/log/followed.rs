@@ -2,36 +2,42 @@
 
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::thread;
 
 use parking_lot::Mutex;
 
-use super::following::{BEGIN_NS, Following, Growth, LogEnd, POLL, Patience};
+use super::following::{BEGIN_NS, FollowOptions, Following, Growth, LogEnd, POLL, Patience};
+use super::pace::Pace;
 use super::{FlightLog, check_magic};
 use crate::files::LogLimits;
 use crate::flight_log::container::ContainerIndex;
 use crate::flight_log::container::file::LogFile;
+use crate::flight_log::live::{Reception, ReceptionEvent};
 use crate::flight_log::{LogError, LogWarning, WarningKind};
 use crate::geometry::seconds_from_ns;
 
 impl FlightLog {
     /// Opens a log that another program is writing, as soon as it contains three seconds; its streams then wait for
-    /// messages until the log has its footer, nothing is written for half a minute, or `stop` is set.
+    /// messages until the log has its footer, nothing is written for half a minute, or it is asked to stop. The end of a
+    /// log that is being received is decided by its reception.
     ///
     /// Topics, start and warnings follow from the messages at opening.
     ///
     /// # Errors
     /// As [`FlightLog::open`], and if the file does not appear within half a minute.
-    pub fn open_following(path: &Path, limits: &LogLimits, stop: Arc<AtomicBool>) -> Result<Self, LogError> {
-        Self::follow(path, limits, stop, Patience::default())
+    pub fn open_following(path: &Path, limits: &LogLimits, follow: FollowOptions) -> Result<Self, LogError> {
+        Self::follow(path, limits, follow, Patience::default())
     }
 
-    fn follow(path: &Path, limits: &LogLimits, stop: Arc<AtomicBool>, patience: Patience) -> Result<Self, LogError> {
+    fn follow(path: &Path, limits: &LogLimits, follow: FollowOptions, patience: Patience) -> Result<Self, LogError> {
         let mut polls = 0;
         let file = loop {
             polls += 1;
-            let waits = polls < patience.idle_polls && !stop.load(Ordering::Relaxed);
+            let waits = match &follow.reception {
+                Some(reception) => !reception.is_over(),
+                None => polls < patience.idle_polls && !follow.stop.load(Ordering::Relaxed),
+            };
             match path.metadata() {
                 Ok(metadata) if metadata.len() == 0 && waits => {}
                 Err(_) if waits => {}
@@ -42,12 +48,13 @@ impl FlightLog {
         check_magic(&file, path)?;
         let (mut index, mut growth) = (ContainerIndex::default(), Growth::new(patience));
         while growth.end.is_none() && index.span_ns() < BEGIN_NS {
-            if !(growth.has_news(&file, &stop) && growth.grow(&file, &mut index, &stop)) {
+            if !(growth.has_news(&file, &follow) && growth.grow(&file, &mut index)) {
                 growth.polls += 1;
                 thread::sleep(POLL);
             }
         }
-        Self::of(path, file, index, Some(Following { growth: Mutex::new(growth), stop }))
+        let pace = follow.longest_delay_s.map(|delay_s| Pace::new(delay_s, index.span_ns()));
+        Self::of(path, file, index, Some(Following { growth: Mutex::new(growth), follow, pace }))
     }
 
     /// Waits until the log has more blocks than this; false if it has ended.
@@ -58,7 +65,7 @@ impl FlightLog {
             if growth.end.is_some() {
                 return self.index().blocks.len() > known;
             }
-            if !self.look(&mut growth, &following.stop) {
+            if !self.look(&mut growth, &following.follow) {
                 growth.polls += 1;
                 // Readers look one after the other, so that their number does not shorten the time without growth.
                 thread::sleep(POLL);
@@ -68,12 +75,12 @@ impl FlightLog {
     }
 
     /// Adds to the index what has been written since; true if there are more blocks.
-    fn look(&self, growth: &mut Growth, stop: &AtomicBool) -> bool {
-        if !growth.has_news(&self.file, stop) {
+    fn look(&self, growth: &mut Growth, follow: &FollowOptions) -> bool {
+        if !growth.has_news(&self.file, follow) {
             return false;
         }
         let mut index = ContainerIndex::clone(&self.index());
-        let has_grown = growth.grow(&self.file, &mut index, stop);
+        let has_grown = growth.grow(&self.file, &mut index);
         if has_grown {
             self.duration_ns.fetch_max(self.since_start(index.last_log_time_ns()), Ordering::Relaxed);
             *self.index.write() = Arc::new(index);
@@ -85,7 +92,7 @@ impl FlightLog {
     pub fn look_for_growth(&self) {
         let Some(following) = &self.following else { return };
         if let Some(mut growth) = following.growth.try_lock().filter(|growth| growth.end.is_none()) {
-            self.look(&mut growth, &following.stop);
+            self.look(&mut growth, &following.follow);
         }
     }
 
@@ -97,6 +104,47 @@ impl FlightLog {
     /// True for a log that was opened while another program was writing it.
     pub fn is_followed(&self) -> bool {
         self.following.is_some()
+    }
+
+    /// Ends reading a log that is being written; a reception completes its recording.
+    pub fn end_following(&self) {
+        if let Some(following) = &self.following {
+            following.follow.stop.store(true, Ordering::Relaxed);
+        }
+    }
+
+    /// The reception that writes the log, if it is being received.
+    pub fn reception(&self) -> Option<&Arc<Reception>> {
+        self.following.as_ref()?.follow.reception.as_ref()
+    }
+
+    /// True if the image at a stamp is to be left out, because the run is too far behind the newest message.
+    pub(crate) fn leaves_out(&self, stamp_ns: i64, rate_hz: f64) -> bool {
+        let pace = self.following.as_ref().and_then(|following| following.pace.as_ref());
+        pace.is_some_and(|pace| pace.leaves_out(stamp_ns, self.duration_ns(), rate_hz))
+    }
+
+    /// True if images may be left out, because they come faster than they are processed.
+    pub fn keeps_up(&self) -> bool {
+        self.following.as_ref().is_some_and(|following| following.pace.is_some())
+    }
+
+    /// True for a gap of a topic during an interruption of the reception, which is reported once.
+    pub(crate) fn is_interruption(&self, gap: &LogWarning) -> bool {
+        let absolute = |stamp_ns: i64| u64::try_from(self.epoch_ns.saturating_add(stamp_ns)).unwrap_or(0);
+        let is_gap = matches!(gap.kind, WarningKind::ImuGap | WarningKind::ImageGap);
+        let of_reception = self.reception().filter(|_| is_gap);
+        of_reception.is_some_and(|reception| reception.was_interrupted(absolute(gap.stamp_ns), absolute(gap.last_ns)))
+    }
+
+    /// Warnings about the reception since the last call.
+    pub(crate) fn take_reception_warnings(&self) -> Vec<LogWarning> {
+        let events = self.reception().map(|reception| reception.take_events()).unwrap_or_default();
+        let warning = |event: ReceptionEvent| {
+            let stamp_ns = if event.log_time_ns == 0 { 0 } else { self.since_start(event.log_time_ns) };
+            LogWarning::new(WarningKind::Reception, "", stamp_ns, event.message)
+        };
+        events.into_iter().map(warning).collect()
     }
 
     /// Reason why a log that was being written has ended; `None` while it grows, and for any other log.
@@ -112,6 +160,7 @@ impl FlightLog {
             LogEnd::Idle => "nothing was written for 30 s, and the log has no footer: its writer has stopped",
             LogEnd::Stopped => "reading was ended before the log was complete",
             LogEnd::Limit => "a limit on the content of a log is reached (--limit)",
+            LogEnd::Unrecorded => "no more could be recorded",
         };
         let message = format!("the log ends after second {after_s:.3}: {problem}; everything before it is used");
         Some(LogWarning::new(WarningKind::Damage, "", self.duration_ns(), message))
@@ -126,7 +175,7 @@ mod tests {
 
     use super::*;
     use crate::files::RigFile as _;
-    use crate::flight_log::MessageKind;
+    use crate::flight_log::{FrameStream, MessageKind, SensorFrame};
 
     const IMPATIENT: Patience = Patience { idle_polls: 10, stopped_ns: 2_000_000_000 };
 
@@ -158,7 +207,7 @@ mod tests {
                     thread::sleep(Duration::from_millis(2));
                 }
             });
-            let log = FlightLog::follow(path, &LogLimits::default(), Arc::default(), IMPATIENT).unwrap();
+            let log = FlightLog::follow(path, &LogLimits::default(), FollowOptions::default(), IMPATIENT).unwrap();
             let times = log_times(&log);
             (log, times)
         })
@@ -196,7 +245,7 @@ mod tests {
         // The first half has more than three seconds; five seconds follow at once, which is longer than the patience.
         let (first, rest) = bytes.split_at(bytes.len() / 2);
         fs::write(&path, first).unwrap();
-        let follow = || FlightLog::follow(&path, &LogLimits::default(), Arc::default(), IMPATIENT);
+        let follow = || FlightLog::follow(&path, &LogLimits::default(), FollowOptions::default(), IMPATIENT);
         let log = Arc::new(follow().unwrap());
         let yaml = include_str!("../../../sample_logs/garden.rig.yaml");
         let rig = crate::sensors::Rig::from_yaml(yaml, Path::new("garden.rig.yaml")).unwrap();
@@ -212,23 +261,57 @@ mod tests {
     }
 
     #[test]
+    fn images_are_left_out_where_a_run_is_too_far_behind() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("live.mcap");
+        let bytes = sample();
+        let (first, rest) = bytes.split_at(bytes.len() / 2);
+        fs::write(&path, first).unwrap();
+        let yaml = include_str!("../../../sample_logs/garden.rig.yaml");
+        let rig = crate::sensors::Rig::from_yaml(yaml, Path::new("garden.rig.yaml")).unwrap();
+        let frames = |log: &Arc<FlightLog>| {
+            let mut stream = FrameStream::with_motion_after(Arc::clone(log), &rig, "cam0", 0.0, None, 0.06).unwrap();
+            let frames: Vec<_> = std::iter::from_fn(|| stream.next_frame()).collect();
+            (frames, stream.remaining_warnings().to_vec())
+        };
+        let options = FollowOptions { longest_delay_s: Some(0.5), ..FollowOptions::default() };
+        let log = Arc::new(FlightLog::follow(&path, &LogLimits::default(), options, IMPATIENT).unwrap());
+        // Five seconds more than at opening are written before the first image is read.
+        fs::OpenOptions::new().append(true).open(&path).unwrap().write_all(rest).unwrap();
+        log.look_for_growth();
+        let (kept, warnings) = frames(&log);
+        let (all, _) = frames(&Arc::new(FlightLog::open(&path).unwrap()));
+        let of_images = kept.iter().flat_map(|frame| &frame.warnings).chain(&warnings);
+        let left_out: usize =
+            of_images.filter(|warning| warning.kind == WarningKind::LeftOut).map(|warning| warning.count).sum();
+        assert_eq!(kept.len() + left_out, all.len());
+        assert!(kept.len() > 20 && left_out > 20, "{} of {}", kept.len(), all.len());
+        for pair in kept.windows(2) {
+            assert_eq!(pair[0].imu.last(), pair[1].imu.first(), "at {}", pair[1].stamp_ns);
+        }
+        let samples = |frames: &[SensorFrame]| frames.iter().map(|frame| frame.imu.len()).sum::<usize>();
+        assert!(samples(&kept) + 2 * left_out + 500 > samples(&all), "{} of {}", samples(&kept), samples(&all));
+    }
+
+    #[test]
     fn reading_ends_when_it_is_asked_to() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("live.mcap");
         let bytes = sample();
         fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
-        let stop = Arc::new(AtomicBool::new(false));
-        let log = FlightLog::follow(&path, &LogLimits::default(), Arc::clone(&stop), Patience::default()).unwrap();
+        let log =
+            FlightLog::follow(&path, &LogLimits::default(), FollowOptions::default(), Patience::default()).unwrap();
         thread::scope(|scope| {
             scope.spawn(|| {
                 thread::sleep(Duration::from_millis(100));
-                stop.store(true, Ordering::Relaxed);
+                log.end_following();
             });
             assert!(!log_times(&log).is_empty());
         });
         assert_eq!(log.end(), Some(LogEnd::Stopped));
         let missing = folder.path().join("none.mcap");
-        let error = FlightLog::follow(&missing, &LogLimits::default(), Arc::default(), IMPATIENT).unwrap_err();
+        let error =
+            FlightLog::follow(&missing, &LogLimits::default(), FollowOptions::default(), IMPATIENT).unwrap_err();
         assert!(error.to_string().contains("none.mcap"), "{error}");
     }
 }

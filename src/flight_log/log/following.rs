@@ -6,8 +6,10 @@ use std::time::Duration;
 
 use parking_lot::Mutex;
 
+use super::pace::Pace;
 use crate::flight_log::container::file::LogFile;
 use crate::flight_log::container::{ContainerIndex, ScanEnd, ScanState};
+use crate::flight_log::live::Reception;
 
 /// Time between two looks at a file that has not grown.
 pub(super) const POLL: Duration = Duration::from_millis(20);
@@ -29,12 +31,38 @@ impl Default for Patience {
     }
 }
 
+/// Way in which a log is read that another program is writing, or that is being received.
+#[derive(Clone, Debug, Default)]
+pub struct FollowOptions {
+    /// Ends reading early once it is set.
+    pub stop: Arc<AtomicBool>,
+    /// The reception that writes the log; it decides about the end of the log.
+    pub reception: Option<Arc<Reception>>,
+    /// Log time by which a run may be behind the newest message before images are left out; `None` leaves out none.
+    pub longest_delay_s: Option<f64>,
+}
+
+/// All are equal, because none changes what is in a log.
+impl PartialEq for FollowOptions {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
+impl FollowOptions {
+    /// Following the log of a reception.
+    pub fn of_reception(reception: &Arc<Reception>, longest_delay_s: Option<f64>) -> Self {
+        Self { stop: reception.stop_flag(), reception: Some(Arc::clone(reception)), longest_delay_s }
+    }
+}
+
 /// Growth of a log.
 #[derive(Debug)]
 pub(super) struct Following {
     pub(super) growth: Mutex<Growth>,
-    /// Set from outside to end the log early.
-    pub(super) stop: Arc<AtomicBool>,
+    pub(super) follow: FollowOptions,
+    /// Choice of images where they come faster than they are processed; `None` for all.
+    pub(super) pace: Option<Pace>,
 }
 
 /// Place up to which the file has been read.
@@ -60,6 +88,8 @@ pub enum LogEnd {
     Stopped,
     /// A limit on the content of a log was reached.
     Limit,
+    /// The program could not record what it received.
+    Unrecorded,
 }
 
 impl Growth {
@@ -68,30 +98,34 @@ impl Growth {
     }
 
     /// True if the file has parts that are not scanned; otherwise the log may have ended.
-    pub(super) fn has_news(&mut self, file: &LogFile, stop: &AtomicBool) -> bool {
+    pub(super) fn has_news(&mut self, file: &LogFile, follow: &FollowOptions) -> bool {
         file.grow();
         if file.len() > self.scanned {
             return true;
         }
-        self.end = self.end_of_wait(stop);
+        let is_over = follow.reception.as_ref().map(|reception| reception.is_over());
+        // A reception may have written the rest of the log before it was over.
+        file.grow();
+        if file.len() > self.scanned {
+            return true;
+        }
+        self.end = match is_over {
+            Some(false) => None,
+            Some(true) => Some(LogEnd::Unrecorded),
+            None if follow.stop.load(Ordering::Relaxed) => Some(LogEnd::Stopped),
+            None => (self.polls > self.patience.idle_polls).then_some(LogEnd::Idle),
+        };
         false
     }
 
-    fn end_of_wait(&self, stop: &AtomicBool) -> Option<LogEnd> {
-        if stop.load(Ordering::Relaxed) {
-            return Some(LogEnd::Stopped);
-        }
-        (self.polls > self.patience.idle_polls).then_some(LogEnd::Idle)
-    }
-
     /// Adds what has been written since; true if there are more blocks.
-    pub(super) fn grow(&mut self, file: &LogFile, index: &mut ContainerIndex, stop: &AtomicBool) -> bool {
+    pub(super) fn grow(&mut self, file: &LogFile, index: &mut ContainerIndex) -> bool {
         (self.scanned, self.polls) = (file.len(), 0);
         let before = index.blocks.len();
         self.end = match index.scan(file, &mut self.scan) {
             ScanEnd::Footer => Some(LogEnd::Complete),
             ScanEnd::Limit => Some(LogEnd::Limit),
-            ScanEnd::EndOfFile | ScanEnd::Incomplete(_) => self.end_of_wait(stop),
+            ScanEnd::EndOfFile | ScanEnd::Incomplete(_) => None,
         };
         index.blocks.len() > before
     }

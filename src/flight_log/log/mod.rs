@@ -1,6 +1,7 @@
 mod followed;
 pub(crate) mod following;
 pub(crate) mod foreign;
+mod pace;
 pub(crate) mod topic_info;
 
 use std::collections::BTreeMap;

@@ -34,8 +34,8 @@ enum ImageContent {
 /// Topic of a camera with its expected rate and size.
 pub(super) struct CameraStream {
     images: OrderedSamples<PendingImage>,
-    /// Number of images in the log.
-    pub(super) count: usize,
+    /// Number of images in the log, when it was opened.
+    count: usize,
     pub(super) topic: String,
     pub(super) key: String,
     pub(super) shift_ns: i64,
@@ -73,6 +73,11 @@ impl CameraStream {
             previous: None,
             copies: CopyJudge::default(),
         })
+    }
+
+    /// Number of images in the log; of a log that is being written, so far.
+    pub(super) fn count(&mut self, context: &ReadContext) -> usize {
+        if context.log.is_followed() { self.images.count(&context.log) } else { self.count }
     }
 
     /// Next image with its stamp since the start of the log, in camera time.

@@ -51,6 +51,17 @@ const WITHOUT_JOINTS_NS: i64 = 400_000_000;
 
 /// Largest delay of log times after header stamps; reading starts this much earlier.
 const SEEK_MARGIN_NS: i64 = 1_000_000_000;
+/// Images that are left out within this time are reported together.
+const LEFT_OUT_NS: i64 = 10_000_000_000;
+
+/// Images that were left out.
+#[derive(Clone, Copy, Debug)]
+struct LeftOut {
+    first_ns: i64,
+    last_ns: i64,
+    count: usize,
+}
+
 /// Assembles the frames of one camera, in order.
 pub(super) struct FrameSource {
     context: ReadContext,
@@ -77,8 +88,12 @@ pub(super) struct FrameSource {
     log_warnings: VecDeque<LogWarning>,
     /// Number of images before the first IMU sample.
     skipped: usize,
+    /// Images that were left out to keep up with a vehicle in flight and are not reported yet.
+    left_out: Option<LeftOut>,
     /// Duration of the samples after a stamp in its frame.
     after_ns: i64,
+    /// Rate of the images, as far as it is known.
+    rate_hz: f64,
 }
 
 impl FrameSource {
@@ -98,7 +113,8 @@ impl FrameSource {
         let from_ns = start_ns.saturating_sub(FIRST_FRAME_IMU_NS + SEEK_MARGIN_NS + shift_ns.abs());
         let stream = CameraStream::new(log, camera, from_ns)?;
         log.require_topic("imu0.rostopic", &rig.imu.topic, &[MessageKind::Imu])?;
-        let half_interval_ns = half_interval_ns(camera.rate_hz, log.topic(&camera.topic).map_or(0.0, |it| it.rate_hz));
+        let topic_rate_hz = log.topic(&camera.topic).map_or(0.0, |it| it.rate_hz);
+        let half_interval_ns = half_interval_ns(camera.rate_hz, topic_rate_hz);
         let joints = joint_angles(log, rig, from_ns, half_interval_ns)?;
         let ground_truth = GroundTruth::new(log, rig, from_ns, &mut context);
         let gimbal_imu = rig.gimbal_imu.as_ref().map(|imu| GimbalImuStream::new(log, imu, from_ns)).transpose()?;
@@ -123,13 +139,20 @@ impl FrameSource {
             end_ns,
             log_warnings,
             skipped: 0,
+            left_out: None,
             after_ns: 0,
+            rate_hz: if camera.rate_hz > 0.0 { camera.rate_hz } else { topic_rate_hz },
         })
     }
 
     /// Adds to each frame the IMU samples of `after_s` seconds after its stamp, as far as the log has them.
     pub(super) fn with_motion_after(self, after_s: f64) -> Self {
         Self { after_ns: ns_from_seconds(after_s), ..self }
+    }
+
+    /// True if images may be left out, because they come faster than they are processed.
+    pub(super) fn keeps_up(&self) -> bool {
+        self.after_ns > 0 && self.context.log.keeps_up()
     }
 
     /// Next frame, `None` at the end of the log or of the requested duration.
@@ -162,6 +185,11 @@ impl FrameSource {
                 }
                 continue;
             }
+            // A stereo partner, whose frames have no samples after them, keeps all images: its other camera chooses.
+            if self.after_ns > 0 && self.context.log.leaves_out(stamp_ns, self.rate_hz) {
+                self.note_left_out(stamp_ns);
+                continue;
+            }
             let (number, log_time_ns) = (pending.number, pending.log_time_ns);
             let rotates = self.rotating_ns.is_some_and(|rotating_ns| imu_stamp_ns - rotating_ns < ROTATING_NS);
             let Some(image) = self.camera.decode(&mut self.context, stamp_ns, pending, rotates) else { continue };
@@ -173,6 +201,10 @@ impl FrameSource {
             let joint_angles = self.joints.as_mut().and_then(|joints| joints.at(context, imu_stamp_ns, previous_ns));
             let ground_truth = self.ground_truth.as_mut().and_then(|poses| poses.at(context, imu_stamp_ns));
             self.warn_of_joint_angles(stamp_ns, joint_angles.is_some());
+            self.context.warnings.extend(self.context.log.take_reception_warnings());
+            if self.left_out.is_some_and(|left_out| stamp_ns - left_out.first_ns > LEFT_OUT_NS) {
+                self.warn_of_left_out();
+            }
             while self.log_warnings.front().is_some_and(|warning| warning.stamp_ns <= stamp_ns) {
                 self.context.warnings.extend(self.log_warnings.pop_front());
             }
@@ -186,7 +218,7 @@ impl FrameSource {
                 gimbal_imu,
                 joint_angles,
                 ground_truth,
-                warnings: std::mem::take(&mut self.context.warnings),
+                warnings: self.take_warnings(),
             });
         }
     }
@@ -194,6 +226,8 @@ impl FrameSource {
     /// Warnings after the last frame.
     pub(super) fn finish(&mut self) -> Vec<LogWarning> {
         self.warn_of_skipped_images();
+        self.warn_of_left_out();
+        self.context.warnings.extend(self.context.log.take_reception_warnings());
         self.imu.finish(&mut self.context);
         self.imu_gaps.finish(&mut self.context);
         if let Some(imu) = &mut self.gimbal_imu {
@@ -203,7 +237,13 @@ impl FrameSource {
         if self.end_ns == i64::MAX {
             self.context.warnings.extend(self.log_warnings.drain(..));
         }
-        std::mem::take(&mut self.context.warnings)
+        self.take_warnings()
+    }
+
+    fn take_warnings(&mut self) -> Vec<LogWarning> {
+        let mut warnings = std::mem::take(&mut self.context.warnings);
+        warnings.retain(|warning| !self.context.log.is_interruption(warning));
+        warnings
     }
 
     /// Reports images of a camera on a gimbal without joint angles for some time, although the log has their topic.
@@ -262,8 +302,27 @@ impl FrameSource {
         }
     }
 
+    fn note_left_out(&mut self, stamp_ns: i64) {
+        let left_out = self.left_out.get_or_insert(LeftOut { first_ns: stamp_ns, last_ns: stamp_ns, count: 0 });
+        left_out.last_ns = stamp_ns;
+        left_out.count += 1;
+    }
+
+    fn warn_of_left_out(&mut self) {
+        let Some(LeftOut { first_ns, last_ns, count }) = self.left_out.take() else { return };
+        let message = format!(
+            "{}: {} from {:.3} s to {:.3} s left out, because the run was behind; the recording has them",
+            self.camera.topic,
+            counted(count, "image"),
+            seconds_from_ns(first_ns),
+            seconds_from_ns(last_ns)
+        );
+        let warning = LogWarning::new(WarningKind::LeftOut, &self.camera.topic, first_ns, message);
+        self.context.warnings.push(warning.with_count(count, last_ns));
+    }
+
     fn warn_of_imu_end(&mut self, stamp_ns: i64, number: usize) {
-        let left = self.camera.count.saturating_sub(number);
+        let left = self.camera.count(&self.context).saturating_sub(number);
         let Some(last) = self.buffer.samples.back() else {
             let message = format!("{}: no IMU sample for the images of {}", self.imu_topic, self.camera.key);
             self.context.warn(WarningKind::NoImu, &self.imu_topic, stamp_ns, message);

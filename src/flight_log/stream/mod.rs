@@ -66,7 +66,7 @@ impl FrameStream {
     }
 
     /// [`Self::new`] with the IMU samples of `after_s` seconds after each stamp, during which the rows of a rolling
-    /// shutter are exposed.
+    /// shutter are exposed. Such a stream leaves out images of a log that is followed with a longest delay.
     pub fn with_motion_after(
         log: Arc<FlightLog>,
         rig: &Rig,
@@ -77,7 +77,8 @@ impl FrameStream {
     ) -> Result<Self, LogError> {
         let path = log.path().to_owned();
         let mut source = FrameSource::new(log, rig, camera_key, start_s, duration_s)?.with_motion_after(after_s);
-        let (sender, receiver) = sync_channel(FRAMES_AHEAD);
+        // Images that are read ahead cannot be left out any more.
+        let (sender, receiver) = sync_channel(if source.keeps_up() { 1 } else { FRAMES_AHEAD });
         let read_ahead = move || {
             while let Some(frame) = source.next_frame() {
                 if sender.send(Delivery::Frame(Box::new(frame))).is_err() {

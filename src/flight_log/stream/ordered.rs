@@ -69,6 +69,11 @@ impl<T> OrderedSamples<T> {
         Self { equal_stamps: true, ..self }
     }
 
+    /// Number of messages in the log so far.
+    pub(super) fn count(&mut self, log: &FlightLog) -> usize {
+        self.messages.count(&log.index(), log.file())
+    }
+
     /// Next sample with its stamp since the start of the log.
     pub(super) fn next(&mut self, context: &mut ReadContext) -> Option<(i64, T)> {
         loop {

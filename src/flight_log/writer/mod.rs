@@ -1,7 +1,7 @@
 //! Writer of flight logs: MCAP with CDR messages and their definitions, in the layout of ROS 2's recorder.
 
 mod encode;
-pub(super) mod excerpt;
+pub(super) mod growing;
 mod protobuf;
 mod results;
 mod schemas;

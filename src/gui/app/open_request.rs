@@ -33,8 +33,8 @@ impl OpenRequest {
 pub struct OpenProgress {
     /// Present work, such as `Converting flight.bag (ROS 1 bag)`.
     pub text: String,
-    /// Completed fraction, from 0 to 1.
-    pub ratio: f64,
+    /// Completed fraction of a conversion, from 0 to 1; `None` while waiting for a log.
+    pub ratio: Option<f64>,
 }
 
 /// Session of an open log, and how it was opened.

@@ -66,7 +66,7 @@ fn files_dropped_together_are_opened_together_and_their_conversion_can_be_cancel
         }
         for step in 0.. {
             let ratio = f64::from(step % 50) / 100.0;
-            if progress(OpenProgress { text: "Converting a.mp4 (MP4 video)".to_owned(), ratio })
+            if progress(OpenProgress { text: "Converting a.mp4 (MP4 video)".to_owned(), ratio: Some(ratio) })
                 == ControlFlow::Break(())
             {
                 break;

@@ -51,10 +51,12 @@ impl Opening {
     ) -> Result<Self, String> {
         let (sender, news) = channel();
         let work = move || {
-            let mut shown: Option<(String, f64)> = None;
+            let mut shown: Option<(String, Option<f64>)> = None;
             let result = open(&mut |progress| {
                 let changed = shown.as_ref().is_none_or(|(text, ratio)| {
-                    *text != progress.text || (progress.ratio - ratio).abs() >= PROGRESS_STEP
+                    let moved =
+                        progress.ratio.zip(*ratio).is_some_and(|(now, shown)| (now - shown).abs() >= PROGRESS_STEP);
+                    *text != progress.text || moved
                 });
                 if !changed {
                     return ControlFlow::Continue(());
@@ -96,7 +98,8 @@ impl Opening {
     /// Present work in a few words.
     pub(super) fn text(&self) -> String {
         match &self.progress {
-            Some(progress) => format!("{}: {:.0} %", progress.text, 100.0 * progress.ratio),
+            Some(OpenProgress { text, ratio: Some(ratio) }) => format!("{text}: {:.0} %", 100.0 * ratio),
+            Some(OpenProgress { text, ratio: None }) => text.clone(),
             None => format!("Opening {}", self.request.names()),
         }
     }
@@ -104,8 +107,9 @@ impl Opening {
     /// Draws the progress; returns true if the opening is cancelled.
     pub(super) fn ui(&self, ui: &mut Ui, theme: &Theme) -> bool {
         let text = self.text();
-        if let Some(progress) = &self.progress {
-            let bar = ui.add(ProgressBar::new(progress.ratio as f32).desired_width(420.0));
+        let ratio = self.progress.as_ref().and_then(|progress| progress.ratio);
+        if let Some(ratio) = ratio {
+            let bar = ui.add(ProgressBar::new(ratio as f32).desired_width(420.0));
             bar.widget_info(|| {
                 egui::WidgetInfo::labeled(egui::Role::ProgressIndicator, true, "Progress of the conversion")
             });
@@ -113,7 +117,7 @@ impl Opening {
             ui.spinner();
         }
         ui.label(RichText::new(text).color(theme.text));
-        if self.progress.is_some() {
+        if ratio.is_some() {
             let hint = "The converted log is kept in the cache folder: next time it opens at once";
             ui.label(RichText::new(hint).color(theme.text_weak));
         }

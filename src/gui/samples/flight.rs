@@ -125,6 +125,7 @@ fn recording_of(flight: &SyntheticFlight, runs: &[&str]) -> Recording {
         agreement: Arc::default(),
         is_being_checked: false,
         is_being_written: false,
+        interruption: None,
         warnings: vec![LogWarning::new(
             WarningKind::ImuGap,
             "/imu",

@@ -13,7 +13,7 @@ pub struct ProgressMeter {
     last: f64,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Progress {
     pub runs: usize,
     /// Processed fraction of the log, 0 to 1.
@@ -22,6 +22,8 @@ pub struct Progress {
     pub left_s: Option<f64>,
     /// Log time by which the last run is behind a log that is being written.
     pub behind_s: Option<f64>,
+    /// Reason why no messages of a log come that is being received.
+    pub interruption: Option<String>,
 }
 
 impl ProgressMeter {
@@ -47,9 +49,10 @@ impl ProgressMeter {
         if recording.is_being_written {
             let open = recording.runs.iter().filter(|run| !run.has_ended());
             let behind_s = open.map(|run| run.behind_s(recording.duration_ns)).max_by(f64::total_cmp);
-            return Some(Progress { runs: fractions.len(), fraction, left_s: None, behind_s });
+            let interruption = recording.interruption.clone();
+            return Some(Progress { runs: fractions.len(), fraction, left_s: None, behind_s, interruption });
         }
-        Some(Progress { runs: fractions.len(), fraction, left_s, behind_s: None })
+        Some(Progress { runs: fractions.len(), fraction, left_s, behind_s: None, interruption: None })
     }
 }
 
@@ -72,7 +75,8 @@ mod tests {
             recording.duration_ns = whole[0].steps[50].report.stamp_ns;
             meter.read(&recording, now_s).unwrap()
         };
-        assert_eq!(at(1, Some(10.0)), Progress { runs: 2, fraction: 0.0, left_s: None, behind_s: None });
+        let begun = Progress { runs: 2, fraction: 0.0, left_s: None, behind_s: None, interruption: None };
+        assert_eq!(at(1, Some(10.0)), begun);
         let half = at(26, Some(20.0));
         assert!((half.fraction - 0.5).abs() < 1e-9 && (half.left_s.unwrap() - 10.0).abs() < 1e-6, "{half:?}");
         assert_eq!(at(11, Some(30.0)).left_s, None, "another run has come");

@@ -162,6 +162,7 @@ fn progress_ui(ui: &mut Ui, progress: &Progress) {
     let left = progress.left_s.map_or_else(String::new, |left_s| format!(", {} s left", fixed(left_s.ceil(), 0)));
     let runs = counted(progress.runs, "run");
     let text = match progress.behind_s {
+        Some(_) if progress.interruption.is_some() => "no connection".to_owned(),
         Some(behind_s) => format!("{runs}: {} s behind", fixed(behind_s, 1)),
         None => format!("{runs}: {} %{left}", fixed(100.0 * progress.fraction, 0)),
     };
@@ -170,10 +171,12 @@ fn progress_ui(ui: &mut Ui, progress: &Progress) {
     let response = ui.add(bar);
     response
         .widget_info(|| egui::WidgetInfo::labeled(egui::Role::ProgressIndicator, true, format!("Computing {text}")));
-    response.on_hover_text(if progress.behind_s.is_some() {
-        "Another program is writing the log: log time from the last step to the newest message"
-    } else {
-        "Estimation progress: processed log time of all runs, remaining wall-clock time"
+    response.on_hover_text(match &progress.interruption {
+        Some(problem) => format!("No messages come, the connection is tried again twice a second: {problem}"),
+        None if progress.behind_s.is_some() => {
+            "Another program is writing the log: log time from the last step to the newest message".to_owned()
+        }
+        None => "Estimation progress: processed log time of all runs, remaining wall-clock time".to_owned(),
     });
 }
 

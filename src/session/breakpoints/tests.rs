@@ -213,6 +213,7 @@ fn recording_of(ranks: &[usize]) -> Recording {
         agreement: Arc::default(),
         is_being_checked: false,
         is_being_written: false,
+        interruption: None,
         warnings: Vec::new(),
         memory_budget_bytes: usize::MAX,
     }

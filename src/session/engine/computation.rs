@@ -76,10 +76,11 @@ impl Computation {
         (recording.check, recording.is_being_checked) = (Some(Arc::new(checked.findings)), false);
     }
 
-    /// Length of a log that another program is writing, or has completed.
-    pub(in crate::session) fn set_written(&mut self, duration_ns: i64, is_being_written: bool) {
+    /// Length of a log that another program is writing, or has completed, and the reason why no messages come.
+    pub(in crate::session) fn set_written(&mut self, duration_ns: i64, is_being_written: bool, gap: Option<String>) {
         let recording = self.recording_mut();
         (recording.duration_ns, recording.is_being_written) = (duration_ns, is_being_written);
+        recording.interruption = gap;
     }
 
     /// The check of the log has been started beside the runs.

@@ -62,6 +62,8 @@ impl Engine {
         runs: &[usize],
     ) -> Result<(), SessionError> {
         let Some(sender) = self.sender.clone() else { return Ok(()) };
+        // Images that wait in a queue cannot be left out any more.
+        let frame_queue_capacity = if plan.log.keeps_up() { 1 } else { FRAME_QUEUE_CAPACITY };
         let mut queues: BTreeMap<&str, Vec<SyncSender<Arc<OwnedStepInput>>>> = BTreeMap::new();
         let mut partners: BTreeMap<&str, &str> = BTreeMap::new();
         for &run in runs {
@@ -69,7 +71,7 @@ impl Engine {
             let cameras: Vec<_> = cameras_of_run(&plan.rig, spec)?.iter().collect();
             let mut frames = Vec::new();
             for camera in &cameras {
-                let (queue, receiver) = sync_channel(FRAME_QUEUE_CAPACITY);
+                let (queue, receiver) = sync_channel(frame_queue_capacity);
                 queues.entry(&camera.key).or_default().push(queue);
                 frames.push(receiver);
             }

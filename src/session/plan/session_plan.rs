@@ -15,7 +15,7 @@ use super::trajectory_spec::{TrajectorySource, TrajectorySpec};
 use crate::estimator::pose_columns;
 use crate::files::LogLimits;
 use crate::flight_log::{
-    FlightLog, LogWarning, MessageKind, WarningKind, image_stamps, imu_samples, is_batch_reference,
+    FlightLog, FollowOptions, LogWarning, MessageKind, WarningKind, image_stamps, imu_samples, is_batch_reference,
 };
 use crate::geometry::{RigidTransform, seconds_from_ns};
 use crate::gimbal::{Chain, ParameterId, Parameterization};
@@ -50,18 +50,8 @@ pub struct SessionRequest {
     pub duration_s: Option<f64>,
     /// Limits on what is read of the log.
     pub limits: LogLimits,
-    /// For a log that another program is writing: the flag that ends reading it early, which is set from outside.
-    pub following: Option<StopFlag>,
-}
-
-/// A flag that ends the reading of a log that is being written; all are equal, because none changes a result.
-#[derive(Clone, Debug, Default)]
-pub struct StopFlag(pub Arc<AtomicBool>);
-
-impl PartialEq for StopFlag {
-    fn eq(&self, _: &Self) -> bool {
-        true
-    }
+    /// For a log that another program is writing: how it is read.
+    pub following: Option<FollowOptions>,
 }
 
 /// A request with its log opened and a camera found for each run.
@@ -116,7 +106,7 @@ impl SessionPlan {
     pub fn open(request: &SessionRequest) -> Result<Self, SessionError> {
         let log = Arc::new(match &request.following {
             None => FlightLog::open_with(&request.log_path, &request.limits)?,
-            Some(StopFlag(stop)) => FlightLog::open_following(&request.log_path, &request.limits, Arc::clone(stop))?,
+            Some(follow) => FlightLog::open_following(&request.log_path, &request.limits, follow.clone())?,
         });
         check_start(&log, request.start_s)?;
         let mut rig = Rig::for_log(&log, request.rig_path.as_deref())?;

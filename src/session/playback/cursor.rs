@@ -278,6 +278,7 @@ mod tests {
                 agreement: std::sync::Arc::default(),
                 is_being_checked: false,
                 is_being_written: false,
+                interruption: None,
                 warnings: Vec::new(),
                 memory_budget_bytes: usize::MAX,
             }

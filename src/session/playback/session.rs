@@ -214,10 +214,13 @@ impl Session {
             return;
         }
         log.look_for_growth();
-        let written = (log.duration_ns(), log.end().is_none());
+        let is_being_written = log.end().is_none();
+        let interruption = log.reception().filter(|_| is_being_written).and_then(|reception| reception.problem());
         let recording = self.recording();
-        if written != (recording.duration_ns, recording.is_being_written) {
-            self.shared.change(|computation| computation.set_written(written.0, written.1));
+        let known = (recording.duration_ns, recording.is_being_written, &recording.interruption);
+        if (log.duration_ns(), is_being_written, &interruption) != known {
+            let duration_ns = log.duration_ns();
+            self.shared.change(|computation| computation.set_written(duration_ns, is_being_written, interruption));
         }
     }
 
@@ -328,6 +331,8 @@ impl Session {
 
 impl Drop for Session {
     fn drop(&mut self) {
+        // A thread that waits for messages of a log that is being written would keep the session open.
+        self.plan.log.end_following();
         // The collector thread ends with the last thread that sends to it.
         self.engine = Engine::default();
         self.engine.no_more_runs();

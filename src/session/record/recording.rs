@@ -43,6 +43,8 @@ pub struct Recording {
     pub is_being_checked: bool,
     /// True while another program is writing the log.
     pub is_being_written: bool,
+    /// Reason why no messages of a log come that is being received; `None` while they come.
+    pub interruption: Option<String>,
     /// Warnings about the log so far, in time order.
     pub warnings: Vec<LogWarning>,
     pub memory_budget_bytes: usize,
@@ -109,6 +111,7 @@ impl Recording {
             agreement: Arc::default(),
             is_being_checked: false,
             is_being_written: false,
+            interruption: None,
             warnings: Vec::new(),
             memory_budget_bytes: plan.memory_budget_bytes,
         };

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use super::{LogWriter, LogWriterOptions, MessageTimes, MessageType};
+use super::writer::{LogWriter, LogWriterOptions, MessageTimes, MessageType};
 use crate::flight_log::container::{ChannelRecord, ContainerIndex, DecodedBlock};
 use crate::flight_log::error::LogError;
 use crate::flight_log::log::FlightLog;
