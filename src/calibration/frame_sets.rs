@@ -86,14 +86,7 @@ impl ImuBuffer {
         let after = self.samples.partition_point(|sample| sample.stamp_ns < stamp_ns);
         let Some(next) = self.samples.get(after) else { return self.samples.last().copied() };
         let Some(before) = after.checked_sub(1).map(|index| &self.samples[index]) else { return Some(*next) };
-        let fraction = (stamp_ns - before.stamp_ns) as f64 / (next.stamp_ns - before.stamp_ns) as f64;
-        Some(ImuSample {
-            stamp_ns,
-            angular_velocity_rad_per_s: before
-                .angular_velocity_rad_per_s
-                .lerp(&next.angular_velocity_rad_per_s, fraction),
-            specific_force_m_per_s2: before.specific_force_m_per_s2.lerp(&next.specific_force_m_per_s2, fraction),
-        })
+        Some(before.interpolated(next, stamp_ns))
     }
 
     /// Samples of an interval, interpolated at both ends.

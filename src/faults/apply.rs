@@ -124,6 +124,7 @@ impl Fault {
             stamp_ns: sample.stamp_ns,
             angular_velocity_rad_per_s: self.angular_velocity(&sample.angular_velocity_rad_per_s),
             specific_force_m_per_s2: self.specific_force(&sample.specific_force_m_per_s2),
+            unmeasured_s: sample.unmeasured_s,
         }
     }
 
@@ -288,6 +289,7 @@ mod tests {
             stamp_ns: 7,
             angular_velocity_rad_per_s: Vector3::new(0.1, 0.2, 0.3),
             specific_force_m_per_s2: Vector3::new(1.0, 2.0, 9.0),
+            unmeasured_s: 0.0,
         };
         let angles = JointAngles { angles_rad: vec![0.1, 0.2, 0.3], ..JointAngles::default() };
         for text in [

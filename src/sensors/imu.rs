@@ -13,6 +13,31 @@ pub struct ImuSample {
     pub angular_velocity_rad_per_s: Vector3<f64>,
     /// Specific force: +g upwards when stationary.
     pub specific_force_m_per_s2: Vector3<f64>,
+    /// Time between the measured samples around one that is interpolated in a gap, in seconds; 0 otherwise.
+    pub unmeasured_s: f64,
+}
+
+/// Longest interval between samples in seconds; a longer one is a gap, in which the motion between them is not known.
+pub(crate) const LONGEST_INTERVAL_S: f64 = 0.06;
+
+impl ImuSample {
+    /// Sample at a time from this one to a later one, both included, by linear interpolation.
+    pub fn interpolated(&self, to: &Self, stamp_ns: i64) -> Self {
+        let interval_ns = to.stamp_ns - self.stamp_ns;
+        if interval_ns <= 0 || stamp_ns >= to.stamp_ns {
+            return Self { stamp_ns, ..if interval_ns > 0 { *to } else { *self } };
+        }
+        let fraction = (stamp_ns - self.stamp_ns) as f64 / interval_ns as f64;
+        let interval_s = seconds_from_ns(interval_ns);
+        let gap_s = if interval_s > LONGEST_INTERVAL_S { interval_s } else { to.unmeasured_s };
+        let gap_s = if stamp_ns > self.stamp_ns { gap_s.max(self.unmeasured_s) } else { self.unmeasured_s };
+        Self {
+            stamp_ns,
+            angular_velocity_rad_per_s: self.angular_velocity_rad_per_s.lerp(&to.angular_velocity_rad_per_s, fraction),
+            specific_force_m_per_s2: self.specific_force_m_per_s2.lerp(&to.specific_force_m_per_s2, fraction),
+            unmeasured_s: gap_s,
+        }
+    }
 }
 
 /// Rotation vector (rad) from each sample to the next, at their mean angular velocity without a bias (rad/s).
@@ -54,5 +79,34 @@ impl ImuNoise {
             gyroscope_noise_density: self.gyroscope_noise_density * factor,
             gyroscope_random_walk: self.gyroscope_random_walk * factor,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sample(stamp_ms: i64, value: f64, unmeasured_s: f64) -> ImuSample {
+        ImuSample {
+            stamp_ns: stamp_ms * 1_000_000,
+            angular_velocity_rad_per_s: Vector3::repeat(value),
+            specific_force_m_per_s2: Vector3::repeat(2.0 * value),
+            unmeasured_s,
+        }
+    }
+
+    #[test]
+    fn a_sample_that_is_interpolated_in_a_gap_says_its_length() {
+        let at = |from: &ImuSample, to: &ImuSample, stamp_ms: i64| from.interpolated(to, stamp_ms * 1_000_000);
+        let (before, after) = (sample(0, 1.0, 0.0), sample(500, 2.0, 0.0));
+        assert_eq!(at(&before, &after, 250), sample(250, 1.5, 0.5));
+        assert_eq!(at(&before, &after, 0), before);
+        assert_eq!(at(&before, &after, 500), after);
+        let near = sample(5, 2.0, 0.0);
+        assert_eq!(at(&before, &near, 1).unmeasured_s, 0.0);
+        // Between a sample that was interpolated in a gap and the first one after it.
+        let last = at(&before, &after, 480);
+        assert_eq!(at(&last, &after, 490).unmeasured_s, 0.5);
+        assert_eq!(at(&after, &after, 500), after);
     }
 }

@@ -76,6 +76,7 @@ impl ImuIntrinsics {
             stamp_ns: sample.stamp_ns,
             angular_velocity_rad_per_s: self.correct_angular_velocity(&sample.angular_velocity_rad_per_s),
             specific_force_m_per_s2: self.correct_specific_force(&sample.specific_force_m_per_s2),
+            unmeasured_s: sample.unmeasured_s,
         }
     }
 
@@ -261,6 +262,7 @@ mod tests {
             stamp_ns: 7,
             angular_velocity_rad_per_s: Vector3::new(0.1, -0.0, 1e-300),
             specific_force_m_per_s2: Vector3::new(1.0 / 3.0, 9.81, -0.0),
+            unmeasured_s: 0.0,
         };
         let bits = |v: &Vector3<f64>| v.map(f64::to_bits);
         let corrected = ImuIntrinsics::default().correct(&sample);

@@ -18,6 +18,7 @@ pub use attitude_source::{
     AngleUnit, AttitudeFrame, AttitudeMessage, AttitudeSource, AttitudeValue, EulerAngles, EulerRotation,
 };
 pub use image_mask::{GrayImage, ImageMask};
+pub(crate) use imu::LONGEST_INTERVAL_S;
 pub use imu::{ImuNoise, ImuSample, STANDARD_GRAVITY_M_PER_S2, rotation_steps};
 pub use imu_intrinsics::{ImuIntrinsics, ImuIntrinsicsParameters, KalibrImuMatrices, ScaleMisalignment};
 pub use joints::{JointAngles, JointMotionFit, JointSample};

@@ -91,6 +91,7 @@ impl ImuRecord {
                 specific_force_m_per_s2: ground_truth.specific_force_m_per_s2
                     + bias.accelerometer_m_per_s2
                     + random.normal_vector(noise.accelerometer_noise_density * white),
+                unmeasured_s: 0.0,
             });
             record.biases.push(bias);
             bias.gyroscope_rad_per_s += random.normal_vector(noise.gyroscope_random_walk * walk);
@@ -131,12 +132,7 @@ impl ImuRecord {
         let Some(from) = after.checked_sub(1).map(|index| &self.samples[index]) else {
             return Some(ImuSample { stamp_ns, ..*to });
         };
-        let fraction = (stamp_ns - from.stamp_ns) as f64 / (to.stamp_ns - from.stamp_ns) as f64;
-        Some(ImuSample {
-            stamp_ns,
-            angular_velocity_rad_per_s: from.angular_velocity_rad_per_s.lerp(&to.angular_velocity_rad_per_s, fraction),
-            specific_force_m_per_s2: from.specific_force_m_per_s2.lerp(&to.specific_force_m_per_s2, fraction),
-        })
+        Some(from.interpolated(to, stamp_ns))
     }
 
     /// Samples from one stamp to another, both ends included and interpolated.

@@ -91,6 +91,7 @@ impl MotionProfile {
             stamp_ns: last.stamp_ns - sample.stamp_ns,
             angular_velocity_rad_per_s: -sample.angular_velocity_rad_per_s,
             specific_force_m_per_s2: sample.specific_force_m_per_s2,
+            unmeasured_s: sample.unmeasured_s,
         };
         let bias = ImuBias { gyroscope_rad_per_s: -self.bias.gyroscope_rad_per_s, ..self.bias };
         let mut motion = Preintegration::new(ImuNoise::ZERO, bias);

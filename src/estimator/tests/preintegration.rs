@@ -36,6 +36,7 @@ fn samples(duration_s: f64, rate_hz: f64) -> Vec<ImuSample> {
                 stamp_ns: ns_from_seconds(k as f64 / rate_hz),
                 angular_velocity_rad_per_s: w + bias().gyroscope_rad_per_s,
                 specific_force_m_per_s2: a + bias().accelerometer_m_per_s2,
+                unmeasured_s: 0.0,
             }
         })
         .collect()
@@ -67,6 +68,61 @@ fn agrees_with_fine_integration() {
         assert!((increment.position_m - p).norm() < 1e-4 * duration_s * duration_s, "position, {duration_s} s");
         assert!((increment.velocity_m_per_s - v).norm() < 2e-4 * duration_s, "velocity, {duration_s} s");
     }
+}
+
+/// Preintegration of a second without the samples within a gap; with the interpolated ones of images in it, if there are
+/// any.
+fn over_gap(from_s: f64, gap_s: f64, images: usize) -> Preintegration {
+    let (from_ns, to_ns) = (ns_from_seconds(from_s), ns_from_seconds(from_s + gap_s));
+    let mut measured = samples(from_s + gap_s + 0.1, 200.0);
+    measured.retain(|sample| sample.stamp_ns <= from_ns || sample.stamp_ns >= to_ns);
+    measured.retain(|sample| sample.stamp_ns >= from_ns - 100_000_000);
+    let after = measured.iter().position(|sample| sample.stamp_ns >= to_ns).unwrap();
+    let (before, next) = (measured[after - 1], measured[after]);
+    let step_ns = (next.stamp_ns - before.stamp_ns) / (images as i64 + 1);
+    let between: Vec<ImuSample> =
+        (1..=images as i64).map(|image| before.interpolated(&next, before.stamp_ns + image * step_ns)).collect();
+    measured.splice(after..after, between);
+    Preintegration::from_samples(NOISE, bias(), &measured)
+}
+
+#[test]
+fn the_covariance_of_a_gap_contains_its_error() {
+    for (gap_s, least) in [(0.1, 0.0), (0.4, 0.005), (0.8, 0.02)] {
+        let (mut sum, mut count) = (0.0, 0);
+        for begin in 0..40 {
+            let from_s = 0.2 + 0.1 * f64::from(begin);
+            let found = over_gap(from_s, gap_s, 0);
+            let duration_s = found.duration_s();
+            let all = samples(from_s + gap_s + 0.1, 200.0);
+            let first_ns = found.samples()[0].stamp_ns;
+            let whole: Vec<ImuSample> = all.into_iter().filter(|sample| sample.stamp_ns >= first_ns).collect();
+            let truth = Preintegration::from_samples(NOISE, bias(), &whole);
+            assert!((truth.duration_s() - duration_s).abs() < 1e-9);
+            let (found_motion, true_motion) = (found.increment(), truth.increment());
+            let rotation = so3::log(&(found_motion.rotation.inverse() * true_motion.rotation));
+            let velocity = true_motion.velocity_m_per_s - found_motion.velocity_m_per_s;
+            for axis in 0..3 {
+                sum += rotation[axis].powi(2) / found.covariance()[(axis, axis)];
+                sum += velocity[axis].powi(2) / found.covariance()[(6 + axis, 6 + axis)];
+                count += 2;
+            }
+        }
+        let mean = sum / f64::from(count);
+        assert!((least..1.5).contains(&mean), "squared error relative to the variance {mean:.3} in gaps of {gap_s} s");
+    }
+}
+
+#[test]
+fn images_within_a_gap_do_not_change_its_covariance() {
+    let (alone, with_images) = (over_gap(0.5, 0.6, 0), over_gap(0.5, 0.6, 11));
+    assert_eq!(with_images.samples().len(), alone.samples().len() + 11);
+    for row in [0, 1, 2, 6, 7, 8] {
+        let (one, other) = (alone.covariance()[(row, row)], with_images.covariance()[(row, row)]);
+        assert!((one / other - 1.0).abs() < 0.2, "row {row}: {one:.4} and {other:.4}");
+    }
+    let without = Preintegration::from_samples(NOISE, bias(), &samples(0.7, 200.0));
+    assert!(alone.covariance()[(0, 0)] > 100.0 * without.covariance()[(0, 0)]);
 }
 
 #[test]

@@ -68,6 +68,7 @@ impl<'a> Landing<'a> {
                     angular_velocity_rad_per_s: later.true_bias.gyroscope_rad_per_s * 2.0
                         - sample.angular_velocity_rad_per_s,
                     specific_force_m_per_s2: sample.specific_force_m_per_s2,
+                    unmeasured_s: 0.0,
                 });
                 backwards.collect()
             });
@@ -114,6 +115,7 @@ impl<'a> Landing<'a> {
                     specific_force_m_per_s2: rotation.inverse() * (acceleration + Vector3::new(0.0, 0.0, 9.81))
                         + first.true_bias.accelerometer_m_per_s2
                         + white(noise.accelerometer_noise_density),
+                    unmeasured_s: 0.0,
                 });
             }
             if let Some(last) = self.frames.last().and_then(|frame| frame.imu.last()) {

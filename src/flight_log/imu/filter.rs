@@ -239,6 +239,7 @@ mod tests {
                 stamp_ns: number * PERIOD_NS,
                 angular_velocity_rad_per_s: Vector3::new(0.3, -0.1, 0.2) + noise(),
                 specific_force_m_per_s2: Vector3::new(0.0, 0.0, 9.81) + noise(),
+                unmeasured_s: 0.0,
             };
             change(number, &mut sample);
             filter.push(sample);

@@ -55,7 +55,12 @@ impl ImuMerge {
             };
             self.gyroscope.pop_front();
             if let Some(specific_force_m_per_s2) = force {
-                return Some(ImuSample { stamp_ns, angular_velocity_rad_per_s, specific_force_m_per_s2 });
+                return Some(ImuSample {
+                    stamp_ns,
+                    angular_velocity_rad_per_s,
+                    specific_force_m_per_s2,
+                    unmeasured_s: 0.0,
+                });
             }
         }
     }

@@ -164,7 +164,10 @@ fn sample_decoder(epoch_ns: i64, clock: StampClock, has_forces: bool) -> Decoder
         }
         let absolute_ns = clock.stamp_ns(imu.stamp_ns, source.position.log_time_ns);
         let stamp_ns = relative_ns(absolute_ns, epoch_ns);
-        Ok((absolute_ns, ImuSample { stamp_ns, angular_velocity_rad_per_s: rate, specific_force_m_per_s2: force }))
+        Ok((
+            absolute_ns,
+            ImuSample { stamp_ns, angular_velocity_rad_per_s: rate, specific_force_m_per_s2: force, unmeasured_s: 0.0 },
+        ))
     })
 }
 
@@ -226,7 +229,7 @@ impl FrameImuBuffer {
         let after = self.samples.iter().position(|sample| sample.stamp_ns >= end_ns);
         if let Some(after) = after {
             let end = match after.checked_sub(1).and_then(|before| self.samples.get(before)) {
-                Some(before) => interpolated(before, &self.samples[after], end_ns),
+                Some(before) => before.interpolated(&self.samples[after], end_ns),
                 None => self.samples[after],
             };
             imu.push(end);
@@ -234,21 +237,5 @@ impl FrameImuBuffer {
         }
         self.forget_before(end_ns);
         imu
-    }
-}
-
-fn fraction_at(from_ns: i64, to_ns: i64, stamp_ns: i64) -> f64 {
-    if to_ns > from_ns { (stamp_ns - from_ns) as f64 / (to_ns - from_ns) as f64 } else { 0.0 }
-}
-
-fn interpolated(from: &ImuSample, to: &ImuSample, stamp_ns: i64) -> ImuSample {
-    let fraction = fraction_at(from.stamp_ns, to.stamp_ns, stamp_ns);
-    if fraction >= 1.0 {
-        return ImuSample { stamp_ns, ..*to };
-    }
-    ImuSample {
-        stamp_ns,
-        angular_velocity_rad_per_s: from.angular_velocity_rad_per_s.lerp(&to.angular_velocity_rad_per_s, fraction),
-        specific_force_m_per_s2: from.specific_force_m_per_s2.lerp(&to.specific_force_m_per_s2, fraction),
     }
 }

@@ -132,6 +132,7 @@ fn sample(stamp_ns: i64, angular_velocity: Vector3<f64>) -> ImuSample {
         stamp_ns,
         angular_velocity_rad_per_s: angular_velocity,
         specific_force_m_per_s2: Vector3::new(0.0, 0.0, 9.81),
+        unmeasured_s: 0.0,
     }
 }
 

@@ -390,6 +390,7 @@ mod tests {
                 stamp_ns,
                 angular_velocity_rad_per_s: rate_at(time_s),
                 specific_force_m_per_s2: world_from_imu.inverse() * Vector3::new(0.0, 0.0, GRAVITY),
+                unmeasured_s: 0.0,
             });
             poses.push((stamp_ns, RigidTransform::new(world_from_imu, Vector3::new(time_s, 0.0, 0.0))));
             world_from_imu *= so3::exp(&(rate_at(time_s + 0.5 * STEP_S) * STEP_S));

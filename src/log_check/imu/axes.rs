@@ -157,6 +157,7 @@ mod tests {
                 stamp_ns: i64::from(number) * 5_000_000,
                 angular_velocity_rad_per_s: rate,
                 specific_force_m_per_s2: force,
+                unmeasured_s: 0.0,
             });
             world_from_imu *= so3::exp(&(rate_at(time_s + 0.0025) * 0.005));
         }

@@ -81,6 +81,7 @@ fn flight_with(
             stamp_ns: number * 5_000_000,
             angular_velocity_rad_per_s: rate_at(t),
             specific_force_m_per_s2: world_from_imu.inverse() * (acceleration + Vector3::new(0.0, 0.0, 9.81)),
+            unmeasured_s: 0.0,
         };
         change(t, &world_from_imu, &mut sample);
         samples.push(sample);

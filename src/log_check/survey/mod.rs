@@ -292,6 +292,7 @@ impl Survey {
                         stamp_ns,
                         angular_velocity_rad_per_s: imu.angular_velocity_rad_per_s,
                         specific_force_m_per_s2: imu.specific_force_m_per_s2,
+                        unmeasured_s: 0.0,
                     };
                     self.imu.push(rig.map_or(measured, |rig| rig.imu.intrinsics.correct(&measured)));
                 }
@@ -363,7 +364,8 @@ fn take_gimbal_imu(
     let message = messages::read_imu(data).map_err(|error| error.to_string())?;
     let (rate, force) = (message.angular_velocity_rad_per_s, message.specific_force_m_per_s2);
     if sensor.topic == topic {
-        let measured = ImuSample { stamp_ns, angular_velocity_rad_per_s: rate, specific_force_m_per_s2: force };
+        let measured =
+            ImuSample { stamp_ns, angular_velocity_rad_per_s: rate, specific_force_m_per_s2: force, unmeasured_s: 0.0 };
         samples.push(sensor.intrinsics.correct(&measured));
     } else {
         forces.push((stamp_ns, sensor.intrinsics.correct_specific_force(&force)));

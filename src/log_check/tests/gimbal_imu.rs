@@ -36,6 +36,7 @@ fn flight(rig: &Rig, late_s: f64) -> (Survey, Vec<ImageRotation>) {
         stamp_ns: ns_from_seconds(time_s + late_s),
         angular_velocity_rad_per_s: rate_at(time_s) + noise.vector() * 0.005,
         specific_force_m_per_s2: Vector3::new(0.0, 0.0, 9.81) + noise.vector() * 0.05,
+        unmeasured_s: 0.0,
     });
     let mut survey = Survey::default();
     survey.gimbal_imu.extend(samples);

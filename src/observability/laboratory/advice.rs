@@ -260,6 +260,7 @@ fn samples(
                 stamp_ns: ns_from_seconds(time_s),
                 angular_velocity_rad_per_s: so3::log(&rotation_change) / (2.0 * STEP_S) + here.bias.gyroscope_rad_per_s,
                 specific_force_m_per_s2: felt + here.bias.accelerometer_m_per_s2,
+                unmeasured_s: 0.0,
             }
         })
         .collect()

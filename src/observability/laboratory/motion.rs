@@ -368,6 +368,7 @@ impl MechanismMotion<'_> {
             stamp_ns: ns_from_seconds(time_s),
             angular_velocity_rad_per_s: so3::log(&rotation_change) / (2.0 * STEP_S),
             specific_force_m_per_s2: self.rotation(time_s).inverse() * felt,
+            unmeasured_s: 0.0,
         }
     }
 
@@ -396,6 +397,7 @@ impl MechanismMotion<'_> {
                 stamp_ns: ns_from_seconds(time_s),
                 angular_velocity_rad_per_s: derivative(since, time_s),
                 specific_force_m_per_s2: rotation.inverse() * (acceleration - self.gravity_in_world),
+                unmeasured_s: 0.0,
             }
         };
         let count = ((to_s - from_s) * rate_hz).round().max(1.0) as usize;

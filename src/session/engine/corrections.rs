@@ -168,6 +168,7 @@ mod tests {
             stamp_ns: 0,
             angular_velocity_rad_per_s: nalgebra::Vector3::new(1.0, 2.0, 3.0),
             specific_force_m_per_s2: nalgebra::Vector3::new(4.0, 5.0, 6.0),
+            unmeasured_s: 0.0,
         };
         let corrected = found.imu(&[sample]).unwrap()[0];
         assert_eq!(corrected.angular_velocity_rad_per_s, nalgebra::Vector3::new(2.0, 1.0, 3.0));

@@ -264,6 +264,7 @@ mod tests {
                 stamp_ns,
                 angular_velocity_rad_per_s: Vector3::zeros(),
                 specific_force_m_per_s2: Vector3::new(0.0, 0.0, stamp_ns as f64),
+                unmeasured_s: 0.0,
             };
             let inside = (before_ns / 5_000_000 + 1..=(stamp_ns - 1) / 5_000_000).map(|number| number * 5_000_000);
             let imu = [before_ns].into_iter().chain(inside).chain([*stamp_ns]).map(sample).collect();

@@ -53,12 +53,7 @@ fn at(samples: &[ImuSample], stamp_ns: i64) -> ImuSample {
         let nearest = samples[next.min(samples.len() - 1)];
         return ImuSample { stamp_ns, ..nearest };
     };
-    let fraction = (stamp_ns - from.stamp_ns) as f64 / (to.stamp_ns - from.stamp_ns) as f64;
-    ImuSample {
-        stamp_ns,
-        angular_velocity_rad_per_s: from.angular_velocity_rad_per_s.lerp(&to.angular_velocity_rad_per_s, fraction),
-        specific_force_m_per_s2: from.specific_force_m_per_s2.lerp(&to.specific_force_m_per_s2, fraction),
-    }
+    from.interpolated(to, stamp_ns)
 }
 
 #[cfg(test)]
@@ -74,6 +69,7 @@ mod tests {
             stamp_ns: stamp_ms * 1_000_000,
             angular_velocity_rad_per_s: Vector3::repeat(stamp_ms as f64),
             specific_force_m_per_s2: Vector3::zeros(),
+            unmeasured_s: 0.0,
         };
         (from_ms..=to_ms).filter(|ms| *ms == from_ms || *ms == to_ms || ms % 5 == 0).map(sample).collect()
     }

@@ -21,6 +21,7 @@ fn increments(count: usize, random: &mut Random) -> Vec<Preintegration> {
                     stamp_ns: step * 5_000_000,
                     angular_velocity_rad_per_s: angular_velocity + random.vector(0.1),
                     specific_force_m_per_s2: force + random.vector(0.5),
+                    unmeasured_s: 0.0,
                 })
                 .collect();
             Preintegration::from_samples(noise(), ImuBias::default(), &samples)

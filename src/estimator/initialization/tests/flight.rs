@@ -363,6 +363,7 @@ pub(super) fn simulate_flight(options: &FlightOptions) -> Flight {
             specific_force_m_per_s2: rotation.inverse() * (path.acceleration(t) + Vector3::z() * GRAVITY)
                 + accelerometer_bias
                 + random.normal_vector() * (imu_noise.accelerometer_noise_density * rate),
+            unmeasured_s: 0.0,
         }
     };
     let mut frames: Vec<Frame> = Vec::new();

@@ -186,6 +186,7 @@ fn frames(
             stamp_ns: ns_from_seconds(time_s),
             angular_velocity_rad_per_s: kinematics.angular_velocity_rad_per_s + bias.gyroscope_rad_per_s,
             specific_force_m_per_s2: kinematics.specific_force_m_per_s2 + bias.accelerometer_m_per_s2,
+            unmeasured_s: 0.0,
         }
     };
     let samples = |from_s: f64, to_s: f64| {

@@ -47,7 +47,7 @@ struct Input {
 impl ContinuousImu<'_> {
     fn input(&self, time_s: f64) -> Input {
         let (angular_velocity_rad_per_s, specific_force_m_per_s2) = self.flight.rate_and_force(time_s);
-        let sample = ImuSample { stamp_ns: 0, angular_velocity_rad_per_s, specific_force_m_per_s2 };
+        let sample = ImuSample { stamp_ns: 0, angular_velocity_rad_per_s, specific_force_m_per_s2, unmeasured_s: 0.0 };
         let corrected = imu_errors::corrected(&self.errors, &sample);
         let (rate_by_errors, force_by_errors) = imu_errors::derivatives(&self.errors, &sample);
         let (mut rate_by, mut force_by) = (ByImu::zeros(), ByImu::zeros());
