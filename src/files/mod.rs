@@ -6,6 +6,7 @@ pub(crate) mod limits;
 pub(crate) mod located;
 pub mod output;
 pub(crate) mod rig;
+pub(crate) mod scratch;
 pub mod stills;
 pub mod urdf;
 pub mod yaml;

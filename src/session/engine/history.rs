@@ -17,6 +17,8 @@ use crate::session::record::StepRecord;
 const MIN_SPACING: usize = 5;
 /// Number of steps before a snapshot in which it looks up its measurements: at least ten seconds.
 const PAST: usize = 256;
+/// Divisor of the budget of the snapshots that gives the budget of the step inputs.
+const INPUT_BUDGET_DIVISOR: usize = 2;
 
 /// Number and memory of the kept estimator snapshots.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -45,7 +47,6 @@ struct Snapshots {
     spacing: usize,
     bytes: usize,
     budget_bytes: usize,
-    input_bytes: usize,
 }
 
 impl History {
@@ -60,8 +61,7 @@ impl History {
     }
 
     fn with(inputs: Arc<StepInputs>, begin: usize, parent: Option<Arc<Self>>, budget_bytes: usize) -> Self {
-        let snapshots =
-            Snapshots { kept: BTreeMap::new(), spacing: MIN_SPACING, bytes: 0, budget_bytes, input_bytes: 0 };
+        let snapshots = Snapshots { kept: BTreeMap::new(), spacing: MIN_SPACING, bytes: 0, budget_bytes };
         Self { inputs, begin, parent, snapshots: Mutex::new(snapshots) }
     }
 
@@ -74,12 +74,9 @@ impl History {
         self.begin
     }
 
-    /// Counts the memory of the step's input, and stores a snapshot of the engine where one is due.
-    pub(in crate::session) fn before_step(&self, step: usize, engine: &RunEngine, input: &OwnedStepInput) {
-        let mut snapshots = self.snapshots.lock();
-        if self.parent.is_none() {
-            snapshots.input_bytes += input.own_bytes();
-        }
+    /// Stores a snapshot of the engine where one is due.
+    pub(in crate::session) fn before_step(&self, step: usize, engine: &RunEngine) {
+        let snapshots = self.snapshots.lock();
         if step != self.begin && !step.is_multiple_of(snapshots.spacing) {
             return;
         }
@@ -97,8 +94,11 @@ impl History {
         self.inputs.range(step.saturating_sub(PAST)..step)
     }
 
-    /// Sets the memory budget of the snapshots in bytes.
+    /// Sets the memory budget of the snapshots in bytes; the inputs may take half of it.
     pub(in crate::session) fn set_budget(&self, budget_bytes: usize) {
+        if self.parent.is_none() {
+            self.inputs.set_budget(budget_bytes / INPUT_BUDGET_DIVISOR);
+        }
         let mut snapshots = self.snapshots.lock();
         snapshots.budget_bytes = budget_bytes;
         snapshots.keep_within_budget(self.begin);
@@ -123,8 +123,8 @@ impl History {
 
     /// Bytes of snapshots and step inputs.
     pub(in crate::session) fn bytes(&self) -> usize {
-        let snapshots = self.snapshots.lock();
-        snapshots.bytes + snapshots.input_bytes
+        let of_inputs = if self.parent.is_none() { self.inputs.own_bytes() } else { 0 };
+        self.snapshots.lock().bytes + of_inputs
     }
 
     /// The engine in its state before a step, `None` for a step that has not been computed.

@@ -26,6 +26,7 @@ mod shifted_imu;
 mod step_inputs;
 mod stereo_pairs;
 mod stopwatch;
+mod stored_input;
 mod synthetic_run;
 mod threads;
 mod tracker;

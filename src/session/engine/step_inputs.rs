@@ -6,6 +6,7 @@ use std::sync::Arc;
 use parking_lot::{Condvar, Mutex};
 
 use crate::estimator::{StepMeasurements, StepReport, allocated_bytes};
+use crate::files::scratch::ScratchFile;
 use crate::flight_log::SensorFrame;
 use crate::frontend::{TrackedFeature, TrackedFrame};
 use crate::geometry::RigidTransform;
@@ -91,9 +92,14 @@ impl OwnedStepInput {
         self.imu.last().map_or(self.stamp_ns, |last| last.stamp_ns)
     }
 
+    /// Memory in bytes with all tracks.
+    fn bytes(&self) -> usize {
+        self.own_bytes() + tracks_bytes(self.main_tracks())
+    }
+
     /// Memory in bytes without the main camera's tracks, which the step's record counts. Every run that shares the
     /// input counts it.
-    pub(super) fn own_bytes(&self) -> usize {
+    fn own_bytes(&self) -> usize {
         let further: usize = self.images.iter().skip(1).map(|image| tracks_bytes(&image.tracks)).sum();
         allocated_bytes(size_of::<Self>() + 2 * size_of::<usize>())
             + allocated_bytes(self.imu.capacity() * size_of::<ImuSample>())
@@ -128,7 +134,11 @@ impl StepMeasurements for OwnedStepInput {
     }
 }
 
-/// Inputs of a run's steps so far, shared with its forks.
+/// Number of the newest inputs that stay in memory in any case; snapshots of the estimator look up measurements in them.
+const NEWEST: usize = 320;
+
+/// Inputs of a run's steps so far, shared with its forks. Beyond a budget the oldest are kept in a temporary file, so that
+/// the memory of a run does not grow with every hour.
 #[derive(Debug, Default)]
 pub(in crate::session) struct StepInputs {
     state: Mutex<InputQueue>,
@@ -137,14 +147,65 @@ pub(in crate::session) struct StepInputs {
 
 #[derive(Debug, Default)]
 struct InputQueue {
-    steps: Vec<Arc<OwnedStepInput>>,
+    steps: Vec<InputPlace>,
     ended: bool,
+    /// Number of the first inputs that are in the file.
+    stored: usize,
+    /// Memory of the others, and without the main camera's tracks.
+    bytes: usize,
+    own_bytes: usize,
+    /// Budget for them, `None` for no limit.
+    budget_bytes: Option<usize>,
+    file: Option<ScratchFile>,
+}
+
+#[derive(Clone, Debug)]
+enum InputPlace {
+    Memory(Arc<OwnedStepInput>),
+    File(Range<u64>),
+}
+
+impl InputQueue {
+    fn get(&mut self, step: usize) -> Option<Arc<OwnedStepInput>> {
+        match self.steps.get(step)? {
+            InputPlace::Memory(input) => Some(Arc::clone(input)),
+            InputPlace::File(place) => {
+                // An input that cannot be read any more, as on a disk that is gone, is like one that is not computed.
+                let bytes = self.file.as_mut()?.read(place).ok()?;
+                OwnedStepInput::from_bytes(&bytes).map(Arc::new)
+            }
+        }
+    }
+
+    /// Moves the oldest inputs into the file until the others fit into their budget. Without space for the file they stay
+    /// in memory.
+    fn keep_within_budget(&mut self) {
+        while self.budget_bytes.is_some_and(|budget| self.bytes > budget) && self.steps.len() > self.stored + NEWEST {
+            let Some(InputPlace::Memory(input)) = self.steps.get(self.stored).cloned() else { return };
+            if self.file.is_none() {
+                self.file = ScratchFile::unnamed().ok();
+            }
+            let Some(place) = self.file.as_mut().and_then(|file| file.append(&input.to_bytes()).ok()) else {
+                self.budget_bytes = None;
+                return;
+            };
+            self.steps[self.stored] = InputPlace::File(place);
+            self.stored += 1;
+            self.bytes -= input.bytes();
+            self.own_bytes -= input.own_bytes();
+        }
+    }
 }
 
 impl StepInputs {
     /// Appends the input of the next step.
     pub(in crate::session) fn push(&self, input: Arc<OwnedStepInput>) {
-        self.state.lock().steps.push(input);
+        let mut state = self.state.lock();
+        state.bytes += input.bytes();
+        state.own_bytes += input.own_bytes();
+        state.steps.push(InputPlace::Memory(input));
+        state.keep_within_budget();
+        drop(state);
         self.grown.notify_all();
     }
 
@@ -156,27 +217,133 @@ impl StepInputs {
 
     /// Input of a step, `None` if it has not been computed.
     pub(in crate::session) fn get(&self, step: usize) -> Option<Arc<OwnedStepInput>> {
-        self.state.lock().steps.get(step).cloned()
+        self.state.lock().get(step)
+    }
+
+    /// Memory in bytes of the inputs that are not in the file, without the main camera's tracks, which the steps' records
+    /// count.
+    pub(in crate::session) fn own_bytes(&self) -> usize {
+        self.state.lock().own_bytes
+    }
+
+    /// Sets the memory budget in bytes.
+    pub(in crate::session) fn set_budget(&self, bytes: usize) {
+        let mut state = self.state.lock();
+        state.budget_bytes = Some(bytes);
+        state.keep_within_budget();
     }
 
     /// Inputs of a range of steps; fewer if some have not been computed.
     pub(super) fn range(&self, steps: Range<usize>) -> Vec<Arc<OwnedStepInput>> {
-        let state = self.state.lock();
-        let end = steps.end.min(state.steps.len());
-        state.steps[steps.start.min(end)..end].to_vec()
+        let mut state = self.state.lock();
+        steps.map_while(|step| state.get(step)).collect()
     }
 
     /// Input of a step. Blocks until it is available; `None` after the last one.
     pub(in crate::session) fn wait_for(&self, step: usize) -> Option<Arc<OwnedStepInput>> {
         let mut state = self.state.lock();
         self.grown.wait_while(&mut state, |state| state.steps.len() <= step && !state.ended);
-        state.steps.get(step).cloned()
+        state.get(step)
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::{UnitQuaternion, Vector2, Vector3};
+
     use super::*;
+    use crate::frontend::{FeatureId, FrontEndStatistics};
+    use crate::sensors::JointMotionFit;
+
+    /// Input with other values in every field by its number.
+    fn rich(number: usize) -> OwnedStepInput {
+        let value = |offset: usize| (number * 100 + offset) as f64 * 0.1;
+        let vector = |offset: usize| Vector3::new(value(offset), -value(offset + 1), value(offset + 2));
+        let imu = |offset: usize| ImuSample {
+            stamp_ns: (number * 10 + offset) as i64,
+            angular_velocity_rad_per_s: vector(offset),
+            specific_force_m_per_s2: vector(offset + 3),
+            unmeasured_s: value(offset),
+        };
+        let feature = |offset: usize| TrackedFeature {
+            id: FeatureId((number + offset) as u64),
+            age: offset as u32,
+            uv_px: Vector2::new(value(offset), value(offset + 1)),
+            previous_uv_px: (offset > 0).then(|| Vector2::new(value(offset), 0.5)),
+            bearing: vector(offset),
+        };
+        let tracks = |offset: usize| TrackedFrame {
+            stamp_ns: offset as i64,
+            features: (0..30).map(|more| feature(offset + more)).collect(),
+            matched: vec![feature(offset + 2)],
+            statistics: FrontEndStatistics {
+                tracked: number,
+                detected: offset,
+                lost: 3,
+                rejected: 4,
+                mean_parallax_px: value(5),
+                median_flow_px: value(6),
+            },
+        };
+        OwnedStepInput {
+            frame_index: number,
+            stamp_ns: number as i64 * 50,
+            log_time_ns: -7,
+            imu: vec![imu(0), imu(1)],
+            imu_after: vec![imu(2)],
+            image_times_s: vec![value(1), value(2)],
+            gimbal_imu: vec![imu(3)],
+            joint_angles: Some(JointAngles {
+                angles_rad: vec![value(1)],
+                sigmas_rad: vec![value(2)],
+                lasting_sigmas_rad: vec![value(3)],
+                rates_rad_per_s: vec![value(4)],
+                motion_fits: vec![JointMotionFit {
+                    rate_sigma_rad_per_s: f64::INFINITY,
+                    acceleration_rad_per_s2: value(5),
+                    acceleration_sigma_rad_per_s2: value(6),
+                }],
+            }),
+            images: vec![
+                StepImage { index: Some(number), tracks: Arc::new(tracks(0)) },
+                StepImage { index: None, tracks: Arc::new(tracks(5)) },
+            ],
+            ground_truth: Some(RigidTransform::new(UnitQuaternion::from_euler_angles(0.1, value(1), 0.3), vector(7))),
+            frontend_ms: value(9),
+        }
+    }
+
+    #[test]
+    fn an_input_is_restored_from_its_bytes_to_the_bit() {
+        let without = OwnedStepInput { joint_angles: None, ground_truth: None, ..rich(3) };
+        for input in [rich(1), without] {
+            let bytes = input.to_bytes();
+            assert_eq!(OwnedStepInput::from_bytes(&bytes), Some(input));
+            assert_eq!(OwnedStepInput::from_bytes(&bytes[..bytes.len() - 1]), None);
+            assert_eq!(OwnedStepInput::from_bytes(&[&bytes[..], &[0]].concat()), None);
+        }
+    }
+
+    #[test]
+    fn inputs_beyond_the_budget_are_read_from_the_file() {
+        let inputs = StepInputs::default();
+        let count = 3 * NEWEST;
+        inputs.push(Arc::new(rich(0)));
+        let one = inputs.own_bytes();
+        inputs.set_budget(0);
+        (1..count).for_each(|number| inputs.push(Arc::new(rich(number))));
+        assert_eq!(inputs.own_bytes(), one * NEWEST, "of {one} bytes each");
+        for number in [0, 1, NEWEST, 2 * NEWEST - 1, 2 * NEWEST, count - 1] {
+            assert_eq!(inputs.get(number).as_deref(), Some(&rich(number)), "{number}");
+        }
+        assert_eq!(inputs.range(2 * NEWEST - 2..2 * NEWEST + 2).len(), 4);
+        assert_eq!(inputs.range(count - 1..count + 5).len(), 1);
+        assert_eq!(inputs.get(count), None);
+        let unlimited = StepInputs::default();
+        unlimited.set_budget(usize::MAX);
+        (0..count).for_each(|number| unlimited.push(Arc::new(rich(number))));
+        assert_eq!(unlimited.own_bytes(), one * count);
+    }
 
     #[test]
     fn a_waiting_reader_receives_the_input_or_the_end() {

@@ -241,7 +241,7 @@ fn run_steps(
 ) {
     let mut error = None;
     for (step, input) in (history.begin()..).zip(inputs) {
-        history.before_step(step, &engine, &input);
+        history.before_step(step, &engine);
         let record = match guarded(input.stamp_ns, || engine.step(&input)) {
             Ok(record) => record,
             Err(reason) => {

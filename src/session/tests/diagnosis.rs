@@ -50,7 +50,7 @@ fn diagnosed_until(
         input_fault(&mut input, &rig);
         let input = Arc::new(input);
         history.inputs().push(Arc::clone(&input));
-        history.before_step(step, &engine, &input);
+        history.before_step(step, &engine);
         record.push(estimated_step(&mut engine, &input));
     }
     let findings = || measured.iter().map(error_of).collect();

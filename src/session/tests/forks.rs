@@ -34,7 +34,7 @@ fn simulated_run(spec: &str) -> SimulatedRun {
     let steps = flight.frames.iter().enumerate().map(|(step, frame)| {
         let input = Arc::new(input_of(frame, Some(sigma_rad)));
         history.inputs().push(Arc::clone(&input));
-        history.before_step(step, &engine, &input);
+        history.before_step(step, &engine);
         engine.step(&input)
     });
     let steps = steps.collect();

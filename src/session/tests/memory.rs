@@ -91,7 +91,7 @@ fn snapshots_fill_their_budget_and_give_back_every_step() {
     for (number, frame) in flight.frames.iter().enumerate() {
         let input = Arc::new(input_of(frame, Some(sigma_rad)));
         history.inputs().push(Arc::clone(&input));
-        history.before_step(number, &engine, &input);
+        history.before_step(number, &engine);
         steps.push(engine.step(&input));
         assert!(history.snapshots().bytes <= BUDGET_BYTES || history.snapshots().count == 1);
     }
