@@ -20,6 +20,8 @@ const RETRY_WAITS: u32 = 25;
 const IDLE_WAITS: u32 = 1500;
 /// Messages that cannot be read and are reported one by one; further ones are counted.
 const REPORTED: u32 = 3;
+/// Largest number of times that refused subscriptions are sent again on one connection.
+const REPEATED: u32 = 50;
 /// Time in nanoseconds by which the server's clock may differ from the time that has passed on one connection; a larger
 /// difference is a step of that clock.
 const CLOCK_STEP_NS: i64 = 2_000_000_000;
@@ -107,6 +109,10 @@ struct Receiver<'a> {
     channels: BTreeMap<u32, u16>,
     /// Subscriptions by the server's identifier of the topic, of the present connection.
     subscribed: BTreeMap<u64, u32>,
+    /// Server's identifiers of the topics by subscription, of those without a message on the present connection.
+    unheard: BTreeMap<u32, u64>,
+    /// Subscriptions that were sent again on the present connection.
+    repeated: u32,
     /// Log time of the last message, 0 before the first.
     last_ns: u64,
     /// Log time minus time of the server's clock, from its steps.
@@ -127,6 +133,8 @@ impl<'a> Receiver<'a> {
             log: None,
             channels: BTreeMap::new(),
             subscribed: BTreeMap::new(),
+            unheard: BTreeMap::new(),
+            repeated: 0,
             last_ns: 0,
             clock_offset_ns: 0,
             waits: 0,
@@ -142,7 +150,7 @@ impl<'a> Receiver<'a> {
             match Connection::open(&self.request.address, message_bytes) {
                 Ok(connection) => {
                     self.reception.connected();
-                    (self.channels, self.subscribed) = Default::default();
+                    (self.channels, self.subscribed, self.unheard, self.repeated) = Default::default();
                     if let Err(error) = self.receive(connection) {
                         self.reception.report(self.last_ns, format!("the recording has ended: {error}"));
                         return;
@@ -239,12 +247,27 @@ impl<'a> Receiver<'a> {
             }
             ServerText::Status { level, message } => {
                 if level >= STATUS_ERROR {
+                    let refused = self.refused(&message);
+                    if !refused.is_empty() && self.repeated < REPEATED {
+                        self.repeated += 1;
+                        thread::sleep(READ);
+                        return Ok(refused);
+                    }
                     self.reception.report(self.last_ns, format!("the server reports: {message}"));
                 }
                 Ok(Vec::new())
             }
             ServerText::Other => Ok(Vec::new()),
         }
+    }
+
+    /// Subscriptions of topics that an error of the server names: a server that has just started may not know a topic yet
+    /// that it has advertised.
+    fn refused(&self, message: &str) -> Vec<(u32, u64)> {
+        let numbers: Vec<u64> =
+            message.split(|letter: char| !letter.is_ascii_digit()).filter_map(|number| number.parse().ok()).collect();
+        let unheard = self.unheard.iter().map(|(subscription, topic)| (*subscription, *topic));
+        unheard.filter(|(_, topic)| numbers.contains(topic)).collect()
     }
 
     fn subscribe(&mut self, topics: &[AdvertisedTopic]) -> Result<Vec<(u32, u64)>, LogError> {
@@ -276,6 +299,7 @@ impl<'a> Receiver<'a> {
             })?;
             self.channels.insert(subscription, channel);
             self.subscribed.insert(topic.id, subscription);
+            self.unheard.insert(subscription, topic.id);
             subscriptions.push((subscription, topic.id));
         }
         Ok(subscriptions)
@@ -310,6 +334,7 @@ impl<'a> Receiver<'a> {
             self.unreadable(&format!("a message has the unknown subscription {subscription}"));
             return Ok(());
         };
+        self.unheard.remove(&subscription);
         let log_time_ns = self.log_time_ns(log_time_ns);
         self.reception.add(data.len());
         self.log()?.write(channel, log_time_ns, data)

@@ -288,6 +288,9 @@ fn what_cannot_be_read_is_left_out_with_a_warning() {
     let (listener, port) = listener();
     let mut receiver = receiver(port, &path, None);
     let mut client = Client::accept(&listener, &text, topics.len());
+    client.0.send(Message::text(r#"{"op":"status","level":2,"message":"Unknown channel ID: 101"}"#)).unwrap();
+    let again = client.0.read().unwrap().to_text().unwrap().to_owned();
+    assert_eq!(again, subscribe(&[(client.1[1].unwrap(), 101)]));
     client.send(&topics, &sent[..20]);
     client.0.send(Message::binary(vec![1, 0, 0])).unwrap();
     client.0.send(Message::text("no JSON")).unwrap();
