@@ -8,7 +8,7 @@ use super::{CalibrationInput, CalibrationOptions};
 use crate::estimator::preintegration::Matrix15;
 use crate::estimator::{ImuBias, NavigationState, Preintegration};
 use crate::geometry::{ns_from_seconds, seconds_from_ns, wrap_angle};
-use crate::sensors::{ImuNoise, ImuSample, JointAngles};
+use crate::sensors::{ImuNoise, ImuSample, JointAngles, sample_at, samples_between};
 
 /// Largest delay of the gimbal camera's image relative to the static camera's image of the same frame set.
 const MAX_IMAGE_DELAY_NS: i64 = 60_000_000;
@@ -83,23 +83,12 @@ impl ImuBuffer {
 
     /// Sample at a time, by linear interpolation; beyond the ends the nearest sample.
     pub(super) fn at(&self, stamp_ns: i64) -> Option<ImuSample> {
-        let after = self.samples.partition_point(|sample| sample.stamp_ns < stamp_ns);
-        let Some(next) = self.samples.get(after) else { return self.samples.last().copied() };
-        let Some(before) = after.checked_sub(1).map(|index| &self.samples[index]) else { return Some(*next) };
-        Some(before.interpolated(next, stamp_ns))
+        sample_at(&self.samples, stamp_ns)
     }
 
     /// Samples of an interval, interpolated at both ends.
     pub(super) fn between(&self, from_ns: i64, to_ns: i64) -> Vec<ImuSample> {
-        let inside = self.samples.partition_point(|sample| sample.stamp_ns <= from_ns)
-            ..self.samples.partition_point(|sample| sample.stamp_ns < to_ns);
-        let mut samples = Vec::with_capacity(inside.len() + 2);
-        samples.extend(self.at(from_ns).map(|sample| ImuSample { stamp_ns: from_ns, ..sample }));
-        if to_ns > from_ns {
-            samples.extend_from_slice(self.samples.get(inside).unwrap_or(&[]));
-            samples.extend(self.at(to_ns).map(|sample| ImuSample { stamp_ns: to_ns, ..sample }));
-        }
-        samples
+        samples_between(&self.samples, from_ns, to_ns)
     }
 
     /// Preintegrated samples of an interval.

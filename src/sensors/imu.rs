@@ -40,6 +40,29 @@ impl ImuSample {
     }
 }
 
+/// Sample at a time, by linear interpolation between samples in the order of their stamps; beyond the ends the nearest one.
+/// `None` without any sample.
+pub fn sample_at(samples: &[ImuSample], stamp_ns: i64) -> Option<ImuSample> {
+    let after = samples.partition_point(|sample| sample.stamp_ns < stamp_ns);
+    match (after.checked_sub(1).map(|before| &samples[before]), samples.get(after)) {
+        (Some(before), Some(next)) => Some(before.interpolated(next, stamp_ns)),
+        (before, next) => next.or(before).map(|nearest| ImuSample { stamp_ns, ..*nearest }),
+    }
+}
+
+/// Samples from one time to another, both ends included as [`sample_at`].
+pub fn samples_between(samples: &[ImuSample], from_ns: i64, to_ns: i64) -> Vec<ImuSample> {
+    let first = samples.partition_point(|sample| sample.stamp_ns <= from_ns);
+    let end = samples.partition_point(|sample| sample.stamp_ns < to_ns);
+    let mut between = Vec::with_capacity(end.saturating_sub(first) + 2);
+    between.extend(sample_at(samples, from_ns));
+    if to_ns > from_ns {
+        between.extend_from_slice(samples.get(first..end).unwrap_or_default());
+        between.extend(sample_at(samples, to_ns));
+    }
+    between
+}
+
 /// Rotation vector (rad) from each sample to the next, at their mean angular velocity without a bias (rad/s).
 pub fn rotation_steps<'a>(samples: &'a [ImuSample], bias: &'a Vector3<f64>) -> impl Iterator<Item = Vector3<f64>> + 'a {
     samples.windows(2).map(move |pair| {

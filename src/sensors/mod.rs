@@ -19,7 +19,7 @@ pub use attitude_source::{
 };
 pub use image_mask::{GrayImage, ImageMask};
 pub(crate) use imu::LONGEST_INTERVAL_S;
-pub use imu::{ImuNoise, ImuSample, STANDARD_GRAVITY_M_PER_S2, rotation_steps};
+pub use imu::{ImuNoise, ImuSample, STANDARD_GRAVITY_M_PER_S2, rotation_steps, sample_at, samples_between};
 pub use imu_intrinsics::{ImuIntrinsics, ImuIntrinsicsParameters, KalibrImuMatrices, ScaleMisalignment};
 pub use joints::{JointAngles, JointMotionFit, JointSample};
 pub use named_axes::{BodyAxes, NamedAxes};

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::random::RandomStream;
 use super::trajectory::Trajectory;
 use crate::geometry::{ns_from_seconds, seconds_from_ns};
-use crate::sensors::{ImuIntrinsics, ImuNoise, ImuSample};
+use crate::sensors::{ImuIntrinsics, ImuNoise, ImuSample, samples_between};
 
 /// Noise of the ADIS16448, the IMU of the paper, with the values of `RotorS`.
 pub const FIREFLY_IMU: ImuNoise = ImuNoise {
@@ -124,28 +124,9 @@ impl ImuRecord {
         }
     }
 
-    /// Sample at a stamp, interpolated linearly; the first or last one outside the record.
-    pub(crate) fn interpolated(&self, stamp_ns: i64) -> Option<ImuSample> {
-        let after = self.samples.partition_point(|sample| sample.stamp_ns < stamp_ns);
-        let last = self.samples.last()?;
-        let Some(to) = self.samples.get(after) else { return Some(ImuSample { stamp_ns, ..*last }) };
-        let Some(from) = after.checked_sub(1).map(|index| &self.samples[index]) else {
-            return Some(ImuSample { stamp_ns, ..*to });
-        };
-        Some(from.interpolated(to, stamp_ns))
-    }
-
     /// Samples from one stamp to another, both ends included and interpolated.
     pub(crate) fn between(&self, from_ns: i64, to_ns: i64) -> Vec<ImuSample> {
-        let first = self.samples.partition_point(|sample| sample.stamp_ns <= from_ns);
-        let end = self.samples.partition_point(|sample| sample.stamp_ns < to_ns);
-        let mut between = Vec::with_capacity(end.saturating_sub(first) + 2);
-        between.extend(self.interpolated(from_ns));
-        between.extend(self.samples.get(first..end).unwrap_or_default());
-        if to_ns > from_ns {
-            between.extend(self.interpolated(to_ns));
-        }
-        between
+        samples_between(&self.samples, from_ns, to_ns)
     }
 
     pub(crate) fn bias_at(&self, stamp_ns: i64) -> SimulatedBias {

@@ -1,6 +1,6 @@
 //! IMU samples of a fork whose cameras have another time offset.
 
-use crate::sensors::ImuSample;
+use crate::sensors::{ImuSample, sample_at};
 
 /// Time before the end of an interval for which samples are kept, in nanoseconds: longer than any shift.
 const KEPT_NS: i64 = 200_000_000;
@@ -33,7 +33,8 @@ impl ShiftedImu {
             }
         }
         let start = self.end.unwrap_or(imu[0]);
-        let stop = at(&known, (stamp_ns + shift_ns).max(start.stamp_ns + SHORTEST_NS));
+        let stop_ns = (stamp_ns + shift_ns).max(start.stamp_ns + SHORTEST_NS);
+        let stop = sample_at(&known, stop_ns).unwrap_or(ImuSample { stamp_ns: stop_ns, ..start });
         let inside = known.iter().filter(|it| it.stamp_ns > start.stamp_ns && it.stamp_ns < stop.stamp_ns);
         let cut = std::iter::once(start).chain(inside.copied()).chain([stop]).collect();
         let following = known.iter().filter(|it| it.stamp_ns > stop.stamp_ns);
@@ -44,16 +45,6 @@ impl ShiftedImu {
         self.recent = known;
         (cut, cut_after)
     }
-}
-
-/// Sample interpolated at a stamp; the nearest one beyond the ends.
-fn at(samples: &[ImuSample], stamp_ns: i64) -> ImuSample {
-    let next = samples.partition_point(|sample| sample.stamp_ns < stamp_ns);
-    let (Some(to), Some(from)) = (samples.get(next), next.checked_sub(1).and_then(|before| samples.get(before))) else {
-        let nearest = samples[next.min(samples.len() - 1)];
-        return ImuSample { stamp_ns, ..nearest };
-    };
-    from.interpolated(to, stamp_ns)
 }
 
 #[cfg(test)]
