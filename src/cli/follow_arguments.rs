@@ -143,7 +143,6 @@ fn server_text(source: &Path) -> Option<&str> {
 }
 
 /// Rig of a recording.
-#[derive(Default)]
 struct RecordedRig {
     /// Text of the rig, `None` without one.
     text: Option<String>,
@@ -154,7 +153,7 @@ struct RecordedRig {
 fn rig_of_recording(estimation: &EstimationArguments, recording: &Path) -> Result<RecordedRig> {
     let stem = recording.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
     let read = |path: &Path| std::fs::read(path).with_context(|| format!("cannot read {}", path.display()));
-    let RecordedRig { mut text, mut attachments } = RecordedRig::default();
+    let (mut text, mut attachments) = (None, Vec::new());
     for (path, ending) in [(&estimation.rig, "rig.yaml"), (&estimation.ground_truth, "truth.yaml")] {
         let Some(path) = path else { continue };
         let content = read(path)?;

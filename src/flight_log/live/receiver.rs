@@ -1,6 +1,6 @@
 //! The thread that receives the messages of a server and records them.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -107,8 +107,8 @@ struct Receiver<'a> {
     log: Option<GrowingLog>,
     /// Channels of the recording by subscription of the present connection.
     channels: BTreeMap<u32, u16>,
-    /// Subscriptions by the server's identifier of the topic, of the present connection.
-    subscribed: BTreeMap<u64, u32>,
+    /// Server's identifiers of the topics that are subscribed on the present connection.
+    subscribed: BTreeSet<u64>,
     /// Server's identifiers of the topics by subscription, of those without a message on the present connection.
     unheard: BTreeMap<u32, u64>,
     /// Subscriptions that were sent again on the present connection.
@@ -132,7 +132,7 @@ impl<'a> Receiver<'a> {
             reception,
             log: None,
             channels: BTreeMap::new(),
-            subscribed: BTreeMap::new(),
+            subscribed: BTreeSet::new(),
             unheard: BTreeMap::new(),
             repeated: 0,
             last_ns: 0,
@@ -273,7 +273,7 @@ impl<'a> Receiver<'a> {
     fn subscribe(&mut self, topics: &[AdvertisedTopic]) -> Result<Vec<(u32, u64)>, LogError> {
         let mut subscriptions = Vec::new();
         for topic in topics {
-            if !self.is_wanted(topic) || self.subscribed.contains_key(&topic.id) {
+            if !self.is_wanted(topic) || self.subscribed.contains(&topic.id) {
                 continue;
             }
             let limits = &self.request.limits;
@@ -298,7 +298,7 @@ impl<'a> Receiver<'a> {
                 schema,
             })?;
             self.channels.insert(subscription, channel);
-            self.subscribed.insert(topic.id, subscription);
+            self.subscribed.insert(topic.id);
             self.unheard.insert(subscription, topic.id);
             subscriptions.push((subscription, topic.id));
         }

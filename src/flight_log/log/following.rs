@@ -99,12 +99,8 @@ impl Growth {
 
     /// True if the file has parts that are not scanned; otherwise the log may have ended.
     pub(super) fn has_news(&mut self, file: &LogFile, follow: &FollowOptions) -> bool {
-        file.grow();
-        if file.len() > self.scanned {
-            return true;
-        }
+        // Asked before the length: a reception may write the rest of the log before it is over.
         let is_over = follow.reception.as_ref().map(|reception| reception.is_over());
-        // A reception may have written the rest of the log before it was over.
         file.grow();
         if file.len() > self.scanned {
             return true;
