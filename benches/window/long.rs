@@ -31,7 +31,7 @@ fn lengthened_run(computation: &Computation, number: usize, period_ns: i64, fram
         let Some(step) = whole.get(frame % whole.len().max(1)) else { break };
         let later_ns = period_ns * (frame / whole.len()) as i64;
         let mut copy = StepRecord::clone(step);
-        copy.tracks = Arc::new((*step.tracks).clone());
+        copy.tracks = Arc::new((*step.tracks.frame()).clone()).into();
         copy.report.stamp_ns += later_ns;
         copy.log_time_ns += later_ns;
         for frame in &mut copy.report.window {

@@ -52,9 +52,9 @@ pub use record::{
     FlightParameter, FlightVerdicts, ForkOrigin, ImageResiduals, KnownLossSummary, LostSince, MeanResidual,
     ParameterSummary, PassProgress, PoseConsistency, PoseError, PositionTruth, RELATIVE_LENGTHS_M, RankColumn,
     RankedCause, Recording, RelativeAccuracy, ResidualSum, RunMemory, RunRecord, RunWarning, SolverPosition,
-    SolverTrace, StepColumn, StepFactorRows, StepImage, StepRecord, TrajectoryAccuracy, TrajectoryEvaluation,
-    TrajectoryLane, TruthAgreement, WaitingReason, WarningLine, add_errors, evaluate_trajectory, flight_advice,
-    flight_headline, least_determined, log_warning_lines, run_warning_lines, warning_lines,
+    SolverTrace, StepColumn, StepFactorRows, StepImage, StepRecord, StepTracks, TrajectoryAccuracy,
+    TrajectoryEvaluation, TrajectoryLane, TruthAgreement, WaitingReason, WarningLine, add_errors, evaluate_trajectory,
+    flight_advice, flight_headline, least_determined, log_warning_lines, run_warning_lines, warning_lines,
 };
 pub use result::{
     Answer, FindingSource, FrameCounts, RankSummary, Requirement, RunFinding, RunSummary, StageSummary, TimingSummary,

@@ -49,7 +49,7 @@ pub(super) fn write(
     let mut circles = Vec::new();
     let mut motions = Vec::new();
     let mut residuals = Vec::new();
-    for track in &tracks.features {
+    for track in &tracks.frame().features {
         let solved = solved.get(&track.id.of_camera(camera));
         let (diameter_px, color) = match solved {
             Some(feature) if feature.rejected => (SOLVED_PX, REJECTED),

@@ -6,7 +6,7 @@ use crate::estimator::{ObservationReport, Phase, StepReport};
 use crate::frontend::{FeatureId, FrontEndStatistics, TrackedFeature};
 use crate::geometry::seconds_from_ns;
 use crate::sensors::Rig;
-use crate::session::RunRecord;
+use crate::session::{RunRecord, StepTracks};
 
 /// Separator between two parts of the caption.
 const SEPARATOR: &str = " · ";
@@ -120,11 +120,13 @@ impl ImageModel {
         let after = run.steps.partition_point(|step| step.report.stamp_ns <= cursor_ns);
         let number = (0..after).rev().find(|number| run.steps[*number].image(camera).is_some())?;
         let step = run.step(number)?;
-        let (image_index, tracks) = step.image(camera)?;
+        let (image_index, kept) = step.image(camera)?;
+        let tracks = kept.frame();
         let report = &step.report;
-        let earlier = || run.steps[..number].iter().rev().filter_map(|step| Some(step.image(camera)?.1));
+        let earlier = run.steps[..number].iter().rev().filter_map(|step| Some(step.image(camera)?.1));
+        let earlier: Vec<_> = earlier.take(TRAIL_FRAMES).map(StepTracks::frame).collect();
         let own = tracks.features.iter().map(|feature| {
-            let trail = earlier().take(TRAIL_FRAMES.min(feature.age as usize)).map_while(|earlier| {
+            let trail = earlier.iter().take(feature.age as usize).map_while(|earlier| {
                 let at = earlier.features.binary_search_by_key(&feature.id, |earlier| earlier.id).ok()?;
                 earlier.features.get(at).map(|earlier| earlier.uv_px)
             });
@@ -132,11 +134,12 @@ impl ImageModel {
         });
         let keys = run.camera_keys(&report.calibration);
         let other = (0..keys.len()).filter(|other| *other != camera).find_map(|other| {
-            let (_, of_other) = step.image(other).filter(|(_, of_other)| !of_other.matched.is_empty())?;
+            let (_, of_other) = step.image(other)?;
             let partner = rig.stereo_partner(rig.camera(keys[other]).ok()?)?;
-            (partner.key == keys[camera]).then_some((other, of_other))
+            let of_other = (partner.key == keys[camera]).then(|| of_other.frame())?;
+            (!of_other.matched.is_empty()).then_some((other, of_other))
         });
-        let of_other = other.into_iter().flat_map(|(other, of_other)| {
+        let of_other = other.iter().flat_map(|&(other, ref of_other)| {
             of_other.matched.iter().map(move |feature| FeatureMark::of(report, (feature, other), Vec::new(), true))
         });
         let of_camera = || report.features.iter().filter(|feature| feature.id.camera() == camera);

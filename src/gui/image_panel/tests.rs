@@ -65,20 +65,19 @@ fn the_caption_is_that_of_the_step_at_or_before_the_cursor() {
 fn marks_have_the_values_of_the_report() {
     let recording = recording();
     let is_rejected = |step: &&Arc<StepRecord>| {
-        let followed = |id| step.tracks.features.iter().any(|feature| feature.id == id);
+        let followed = |id| step.track(id).is_some();
         step.report.features.iter().any(|feature| feature.rejected && followed(feature.id))
     };
     let step = recording.runs[0].steps.iter().rfind(is_rejected).expect("the estimator rejects outliers");
     let model = ImageModel::at(&recording.rig, &recording.runs[0], 0, step.report.stamp_ns).unwrap();
-    assert_eq!(model.marks.len(), step.tracks.features.len());
+    assert_eq!(model.marks.len(), step.tracks.count);
     let solved = model.marks.iter().filter(|mark| mark.solved.is_some()).count();
-    let followed = |id| step.tracks.features.iter().any(|track| track.id == id);
+    let followed = |id| step.track(id).is_some();
     assert_eq!(solved, step.report.features.iter().filter(|feature| followed(feature.id)).count());
     for mark in &model.marks {
         assert_eq!(mark.trail_px.len(), (mark.age as usize).min(4), "trail of {:?}", mark.id);
         if let Some(earlier) = mark.trail_px.first() {
-            let track = step.tracks.features.iter().find(|feature| feature.id == mark.id).unwrap();
-            assert_eq!(Some(*earlier), track.previous_uv_px);
+            assert_eq!(Some(*earlier), step.track(mark.id).unwrap().previous_uv_px);
         }
     }
     let rejected = model.marks.iter().find(|mark| mark.solved.is_some_and(|solved| solved.rejected)).unwrap();
@@ -139,14 +138,15 @@ fn with_second_camera(mut recording: Recording) -> Recording {
             base: Some("cam0".to_owned()),
             base_from_camera: first_from_camera,
         });
-        let tracks = Arc::make_mut(&mut step.tracks);
+        let mut tracks = (*step.tracks.frame()).clone();
         let further = TrackedFrame { features: tracks.features.split_off(tracks.features.len() / 2), ..tracks.clone() };
         tracks.matched = tracks.features.iter().take(3).copied().collect();
         let has_image = number.is_multiple_of(2);
         step.further_images.push(StepImage {
             index: has_image.then_some(1000 + number),
-            tracks: if has_image { Arc::new(further) } else { Arc::default() },
+            tracks: Arc::new(if has_image { further } else { TrackedFrame::default() }).into(),
         });
+        step.tracks = Arc::new(tracks).into();
     }
     recording
 }
@@ -157,11 +157,12 @@ fn cameras_of_a_run_are_shown_alone_or_side_by_side() {
     let end_ns = recording.duration_ns;
     let steps = &recording.runs[0].steps;
     let [last, before] = [&steps[79], &steps[78]];
-    assert_eq!((last.image(1), before.image(1).unwrap().0), (None, 1078));
-    let further = &before.further_images[0].tracks.features;
-    assert_eq!(before.feature_count(), before.tracks.features.len() + further.len());
+    assert!(last.image(1).is_none());
+    assert_eq!(before.image(1).unwrap().0, 1078);
+    let further = &before.further_images[0].tracks.frame().features;
+    assert_eq!(before.feature_count(), before.tracks.count + further.len());
     let id = further[0].id.of_camera(1);
-    assert_eq!(before.track(id), Some(&further[0]));
+    assert_eq!(before.track(id), Some(further[0]));
 
     // The last image of the camera, with its own features and those that the other camera of the pair tracks.
     let model = ImageModel::at(&recording.rig, &recording.runs[0], 1, end_ns).unwrap();
@@ -183,7 +184,7 @@ fn cameras_of_a_run_are_shown_alone_or_side_by_side() {
     };
     let rows = |table: &str, key: &str| table.lines().filter(|line| line.starts_with(&format!("{key},"))).count();
     let all = table(ShownCameras::All);
-    assert_eq!([rows(&all, "cam0"), rows(&all, "cam1")], [last.tracks.features.len(), further.len() + 3]);
+    assert_eq!([rows(&all, "cam0"), rows(&all, "cam1")], [last.tracks.count, further.len() + 3]);
     assert_eq!(rows(&table(ShownCameras::Main), "cam1"), 0);
     assert_eq!(rows(&table(ShownCameras::of_name("cam1")), "cam0"), 0);
 

@@ -165,7 +165,7 @@ fn run_on(flight: &SyntheticFlight, name: &str) -> RunRecord {
         run.push(StepRecord {
             report,
             rank,
-            tracks: Arc::new(frame.tracks.clone()),
+            tracks: Arc::new(frame.tracks.clone()).into(),
             further_images: Vec::new(),
             ground_truth: Some(frame.true_world_from_imu),
             log_time_ns: frame.stamp_ns + LOG_DELAY_NS,

@@ -31,7 +31,7 @@ fn the_palette_goes_to_times_and_frames_and_selects() {
     let (frame, stamp_ns) = (step.report.frame_index, step.report.stamp_ns);
     assert_eq!(choose(&mut harness, &format!("frame {frame}")), [Command::Seek { stamp_ns }]);
     let cursor_ns = harness.state().cursor_ns;
-    let id = harness.state().recording.runs[0].step_at(cursor_ns).unwrap().tracks.features[5].id;
+    let id = harness.state().recording.runs[0].step_at(cursor_ns).unwrap().tracks.frame().features[5].id;
     choose(&mut harness, &format!("feature {}", id.0));
     assert_eq!(harness.state().selection.feature, Some(id));
     assert_ne!(id, FeatureId(u64::MAX));

@@ -4,8 +4,7 @@ use std::sync::Arc;
 
 use crate::frontend::FeatureId;
 use crate::geometry::SplitMix64;
-use crate::session::engine::{OwnedStepInput, RunEngine};
-use crate::session::record::StepImage;
+use crate::session::engine::{InputImage, OwnedStepInput, RunEngine};
 
 /// Mean number of features in an image of a trial.
 const FEATURES: f64 = 150.0;
@@ -35,12 +34,12 @@ impl Thinning {
         if self.ratio >= 1.0 {
             return Arc::clone(input);
         }
-        let thinned = |image: &StepImage| {
+        let thinned = |image: &InputImage| {
             let mut tracks = (*image.tracks).clone();
             tracks.features.retain(|feature| self.keeps(feature.id));
             tracks.matched.retain(|feature| self.keeps(feature.id));
             tracks.statistics.tracked = tracks.features.iter().filter(|feature| feature.age > 0).count();
-            StepImage { tracks: Arc::new(tracks), ..image.clone() }
+            InputImage { tracks: Arc::new(tracks), ..image.clone() }
         };
         let images = input.images.iter().map(thinned).collect();
         Arc::new(OwnedStepInput { images, ..(**input).clone() })

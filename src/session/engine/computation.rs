@@ -164,7 +164,9 @@ impl Computation {
     fn keep_within_budget(&mut self) {
         let recording = Arc::make_mut(&mut self.recording);
         for run in &mut recording.runs {
-            run.memory.history = self.histories.get(&run.id).map_or(0, |history| history.bytes());
+            let history = self.histories.get(&run.id);
+            run.memory.history = history.map_or(0, |history| history.bytes());
+            run.memory.tracks = history.map_or(run.memory.tracks, |history| history.tracks_bytes());
         }
         while recording.memory_bytes() > recording.memory_budget_bytes {
             // The largest run goes first; forks come after the run that they share steps with.

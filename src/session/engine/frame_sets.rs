@@ -6,11 +6,10 @@ use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 
 use super::frame_camera::{FrameCamera, TOGETHER_NS};
-use super::step_inputs::OwnedStepInput;
+use super::step_inputs::{InputImage, OwnedStepInput};
 use crate::estimator::OTHER_CAMERA_FRAMES;
 use crate::geometry::seconds_from_ns;
 use crate::sensors::ImuSample;
-use crate::session::record::StepImage;
 
 /// Images of one camera of a run.
 #[derive(Debug)]
@@ -162,7 +161,7 @@ impl FrameSets {
             if frame.gimbal_imu.is_empty() { Vec::new() } else { following(self.gimbal_end, &frame.gimbal_imu) };
         self.gimbal_end = gimbal_imu.last().copied();
         let image = |image: &Option<Arc<OwnedStepInput>>| {
-            image.as_ref().map_or_else(StepImage::default, |image| image.images[0].clone())
+            image.as_ref().map_or_else(InputImage::default, |image| image.images[0].clone())
         };
         OwnedStepInput {
             frame_index: main.map_or(OTHER_CAMERA_FRAMES * set.frame + frame.frame_index, |main| main.frame_index),
@@ -279,7 +278,7 @@ mod tests {
                     image_times_s: Vec::new(),
                     gimbal_imu: Vec::new(),
                     joint_angles: None,
-                    images: vec![StepImage {
+                    images: vec![InputImage {
                         index: Some(index),
                         tracks: Arc::new(TrackedFrame {
                             stamp_ns: *stamp_ns,

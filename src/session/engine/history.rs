@@ -127,6 +127,11 @@ impl History {
         self.snapshots.lock().bytes + of_inputs
     }
 
+    /// Bytes of the main camera's tracks in memory, which all runs on the camera share.
+    pub(in crate::session) fn tracks_bytes(&self) -> usize {
+        self.inputs.tracks_bytes()
+    }
+
     /// The engine in its state before a step, `None` for a step that has not been computed.
     pub(in crate::session) fn engine_before(&self, step: usize) -> Option<RunEngine> {
         if step < self.begin {

@@ -50,7 +50,7 @@ pub(in crate::session) use passes::guarded;
 pub use planned_flight::situation_before_flight;
 pub(in crate::session) use recompute::{Detail, RecomputeRequest, RecomputeThread, Recomputed, STEPS_AT_ONCE};
 pub(in crate::session) use run_engine::RunEngine;
-pub(in crate::session) use step_inputs::OwnedStepInput;
+pub(in crate::session) use step_inputs::{InputImage, OwnedStepInput};
 pub use stopwatch::Stopwatch;
 pub use synthetic_run::record_synthetic;
 #[cfg(test)]

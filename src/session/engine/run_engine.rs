@@ -3,13 +3,13 @@ use std::sync::Arc;
 
 use super::altered_measurements::AlteredMeasurements;
 use super::shifted_imu::ShiftedImu;
-use super::step_inputs::OwnedStepInput;
+use super::step_inputs::{InputImage, OwnedStepInput};
 use super::stopwatch::Stopwatch;
 use crate::estimator::{Estimator, EstimatorConfig, PackedEstimator, StepInput, StepMeasurements, StepReport};
 use crate::frontend::TrackedFrame;
 use crate::gimbal::{Chain, ParameterGroup, ParameterId};
 use crate::observability::{RankReport, analyse};
-use crate::session::record::{StepImage, StepRecord};
+use crate::session::record::StepRecord;
 
 /// Jacobian columns of the extrinsics of a further camera.
 const POSE_COLUMNS: usize = 6;
@@ -138,7 +138,7 @@ impl RunEngine {
             .images
             .iter()
             .enumerate()
-            .map(|(camera, StepImage { tracks, .. })| {
+            .map(|(camera, InputImage { tracks, .. })| {
                 let altered = alterations.tracks(camera, tracks).map_or(Cow::Borrowed(&**tracks), Cow::Owned);
                 let partner = self.estimator.config().partner(camera);
                 if partner.is_some_and(|partner| alterations.is_disabled(partner)) && !altered.matched.is_empty() {

@@ -12,7 +12,21 @@ use crate::frontend::{TrackedFeature, TrackedFrame};
 use crate::geometry::RigidTransform;
 use crate::observability::RankReport;
 use crate::sensors::{ImuSample, JointAngles};
-use crate::session::record::{StepImage, StepRecord, tracks_bytes};
+use crate::session::record::{KeptTracks, StepImage, StepRecord, tracks_bytes};
+
+/// Image of one camera in the input of a step, with its feature tracks.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(in crate::session) struct InputImage {
+    /// Index in the camera's stream, `None` where the camera has no image in the step.
+    pub(in crate::session) index: Option<usize>,
+    pub(in crate::session) tracks: Arc<TrackedFrame>,
+}
+
+impl InputImage {
+    fn recorded(&self) -> StepImage {
+        StepImage { index: self.index, tracks: Arc::clone(&self.tracks).into() }
+    }
+}
 
 /// Input of one step: measurements of one camera, or of a set of images.
 ///
@@ -41,7 +55,7 @@ pub(in crate::session) struct OwnedStepInput {
     /// Encoder readings at the stamp of the main camera's image.
     pub(in crate::session) joint_angles: Option<JointAngles>,
     /// Images by camera, the main camera first.
-    pub(in crate::session) images: Vec<StepImage>,
+    pub(in crate::session) images: Vec<InputImage>,
     /// `world_from_imu` of the ground truth.
     pub(in crate::session) ground_truth: Option<RigidTransform>,
     /// Computing time of the front ends.
@@ -54,8 +68,8 @@ impl OwnedStepInput {
         StepRecord {
             report,
             rank,
-            tracks: Arc::clone(self.main_tracks()),
-            further_images: self.images[1..].to_vec(),
+            tracks: Arc::clone(self.main_tracks()).into(),
+            further_images: self.images[1..].iter().map(InputImage::recorded).collect(),
             ground_truth: self.ground_truth,
             log_time_ns: self.log_time_ns,
             summary_only: false,
@@ -72,7 +86,7 @@ impl OwnedStepInput {
             image_times_s: Vec::new(),
             gimbal_imu: frame.gimbal_imu,
             joint_angles: frame.joint_angles,
-            images: vec![StepImage { index: Some(frame.index), tracks: Arc::new(tracks) }],
+            images: vec![InputImage { index: Some(frame.index), tracks: Arc::new(tracks) }],
             ground_truth: frame.ground_truth,
             frontend_ms,
         }
@@ -97,8 +111,8 @@ impl OwnedStepInput {
         self.own_bytes() + tracks_bytes(self.main_tracks())
     }
 
-    /// Memory in bytes without the main camera's tracks, which the step's record counts. Every run that shares the
-    /// input counts it.
+    /// Memory in bytes without the main camera's tracks, which all runs on the camera share. Every run that shares the input
+    /// counts it.
     fn own_bytes(&self) -> usize {
         let further: usize = self.images.iter().skip(1).map(|image| tracks_bytes(&image.tracks)).sum();
         allocated_bytes(size_of::<Self>() + 2 * size_of::<usize>())
@@ -107,7 +121,7 @@ impl OwnedStepInput {
             + allocated_bytes(self.image_times_s.capacity() * size_of::<f64>())
             + allocated_bytes(self.gimbal_imu.capacity() * size_of::<ImuSample>())
             + self.joint_angles.as_ref().map_or(0, |angles| allocated_bytes(angles.heap_bytes()))
-            + allocated_bytes(self.images.capacity() * size_of::<StepImage>())
+            + allocated_bytes(self.images.capacity() * size_of::<InputImage>())
             + further
     }
 }
@@ -220,10 +234,15 @@ impl StepInputs {
         self.state.lock().get(step)
     }
 
-    /// Memory in bytes of the inputs that are not in the file, without the main camera's tracks, which the steps' records
-    /// count.
+    /// Memory in bytes of the inputs that are not in the file, without the main camera's tracks.
     pub(in crate::session) fn own_bytes(&self) -> usize {
         self.state.lock().own_bytes
+    }
+
+    /// Memory in bytes of the main camera's tracks that are not in the file, which all runs on the camera share.
+    pub(in crate::session) fn tracks_bytes(&self) -> usize {
+        let state = self.state.lock();
+        state.bytes - state.own_bytes
     }
 
     /// Sets the memory budget in bytes.
@@ -247,6 +266,12 @@ impl StepInputs {
     }
 }
 
+impl KeptTracks for StepInputs {
+    fn tracks(&self, step: usize, camera: usize) -> Option<Arc<TrackedFrame>> {
+        Some(Arc::clone(&self.get(step)?.images.get(camera)?.tracks))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use nalgebra::{UnitQuaternion, Vector2, Vector3};
@@ -254,6 +279,8 @@ mod tests {
     use super::*;
     use crate::frontend::{FeatureId, FrontEndStatistics};
     use crate::sensors::JointMotionFit;
+    use crate::session::tests::memory::estimated;
+    use crate::simulation::{SyntheticOptions, synthetic_tracks};
 
     /// Input with other values in every field by its number.
     fn rich(number: usize) -> OwnedStepInput {
@@ -305,8 +332,8 @@ mod tests {
                 }],
             }),
             images: vec![
-                StepImage { index: Some(number), tracks: Arc::new(tracks(0)) },
-                StepImage { index: None, tracks: Arc::new(tracks(5)) },
+                InputImage { index: Some(number), tracks: Arc::new(tracks(0)) },
+                InputImage { index: None, tracks: Arc::new(tracks(5)) },
             ],
             ground_truth: Some(RigidTransform::new(UnitQuaternion::from_euler_angles(0.1, value(1), 0.3), vector(7))),
             frontend_ms: value(9),
@@ -321,6 +348,36 @@ mod tests {
             assert_eq!(OwnedStepInput::from_bytes(&bytes), Some(input));
             assert_eq!(OwnedStepInput::from_bytes(&bytes[..bytes.len() - 1]), None);
             assert_eq!(OwnedStepInput::from_bytes(&[&bytes[..], &[0]].concat()), None);
+        }
+    }
+
+    #[test]
+    fn the_record_of_a_step_reads_tracks_that_are_no_longer_in_memory() {
+        let flight = synthetic_tracks(&SyntheticOptions { duration_s: 0.2, ..SyntheticOptions::default() });
+        let report = &estimated(&flight, "auto").steps[0].report;
+        let inputs = Arc::new(StepInputs::default());
+        let kept: Arc<dyn KeptTracks> = Arc::clone(&inputs) as _;
+        inputs.set_budget(0);
+        let records: Vec<StepRecord> = (0..=NEWEST)
+            .map(|number| {
+                let input = Arc::new(rich(number));
+                inputs.push(Arc::clone(&input));
+                let mut record = input.record(report.clone(), None);
+                assert_ne!(record.tracks_bytes(), 0);
+                record.keep_tracks_in(&kept, number);
+                assert_eq!(record.tracks_bytes(), 0);
+                record
+            })
+            .collect();
+        assert_eq!(inputs.tracks_bytes(), NEWEST * tracks_bytes(rich(0).main_tracks()));
+        for number in [0, 1, NEWEST] {
+            let [record, same] = [&records[number], &records[number].clone()];
+            let images = [&record.tracks, &record.further_images[0].tracks];
+            for (image, expected) in images.into_iter().zip(&rich(number).images) {
+                assert_eq!(image.frame(), expected.tracks, "{number}");
+                assert_eq!((image.stamp_ns, image.count), (expected.tracks.stamp_ns, expected.tracks.features.len()));
+            }
+            assert!(record.tracks.is_same(&same.tracks) && !record.tracks.is_same(&record.further_images[0].tracks));
         }
     }
 
@@ -367,7 +424,7 @@ mod tests {
                 image_times_s: Vec::new(),
                 gimbal_imu: Vec::new(),
                 joint_angles: None,
-                images: vec![StepImage::default()],
+                images: vec![InputImage::default()],
                 ground_truth: None,
                 frontend_ms: 0.0,
             }));

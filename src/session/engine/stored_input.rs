@@ -4,11 +4,10 @@ use std::sync::Arc;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector2, Vector3};
 
-use super::step_inputs::OwnedStepInput;
+use super::step_inputs::{InputImage, OwnedStepInput};
 use crate::frontend::{FeatureId, FrontEndStatistics, TrackedFeature, TrackedFrame};
 use crate::geometry::RigidTransform;
 use crate::sensors::{ImuSample, JointAngles, JointMotionFit};
-use crate::session::record::StepImage;
 
 impl OwnedStepInput {
     /// The input as bytes.
@@ -75,7 +74,7 @@ stored_fields! {
     ImuSample { stamp_ns, angular_velocity_rad_per_s, specific_force_m_per_s2, unmeasured_s }
     JointAngles { angles_rad, sigmas_rad, lasting_sigmas_rad, rates_rad_per_s, motion_fits }
     JointMotionFit { rate_sigma_rad_per_s, acceleration_rad_per_s2, acceleration_sigma_rad_per_s2 }
-    StepImage { index, tracks }
+    InputImage { index, tracks }
     TrackedFrame { stamp_ns, features, matched, statistics }
     TrackedFeature { id, age, uv_px, previous_uv_px, bearing }
     FrontEndStatistics { tracked, detected, lost, rejected, mean_parallax_px, median_flow_px }

@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use super::configuration::estimator_config;
 use super::run_engine::RunEngine;
-use super::step_inputs::OwnedStepInput;
+use super::step_inputs::{InputImage, OwnedStepInput};
 use crate::session::plan::{RunSpec, SessionError};
-use crate::session::record::{RunRecord, StepImage, StepRecord};
+use crate::session::record::{RunRecord, StepRecord};
 use crate::simulation::{SyntheticFlight, SyntheticFrame};
 
 /// The step input of a synthetic frame; joint angles are as uncertain as given, and missing without an uncertainty.
@@ -20,7 +20,7 @@ pub(in crate::session) fn input_of(frame: &SyntheticFrame, encoder_sigma_rad: Op
         image_times_s: Vec::new(),
         gimbal_imu: frame.gimbal_imu.clone(),
         joint_angles: encoder_sigma_rad.and_then(|sigma_rad| frame.encoder_angles(sigma_rad)),
-        images: vec![StepImage { index: Some(frame.index), tracks: Arc::new(frame.tracks.clone()) }],
+        images: vec![InputImage { index: Some(frame.index), tracks: Arc::new(frame.tracks.clone()) }],
         ground_truth: Some(frame.true_world_from_imu),
         frontend_ms: 0.0,
     }

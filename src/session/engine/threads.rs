@@ -20,6 +20,7 @@ use super::step_inputs::OwnedStepInput;
 use super::tracker::CameraTracker;
 use crate::estimator::EstimatorConfig;
 use crate::session::plan::{RunSpec, SessionError, SessionPlan, cameras_of_run};
+use crate::session::record::KeptTracks;
 
 /// Capacity in frames of the queue between a tracker and an estimator.
 const FRAME_QUEUE_CAPACITY: usize = 8;
@@ -240,15 +241,17 @@ fn run_steps(
     results: &SyncSender<EngineMessage>,
 ) {
     let mut error = None;
+    let kept: Arc<dyn KeptTracks> = Arc::clone(history.inputs()) as _;
     for (step, input) in (history.begin()..).zip(inputs) {
         history.before_step(step, &engine);
-        let record = match guarded(input.stamp_ns, || engine.step(&input)) {
+        let mut record = match guarded(input.stamp_ns, || engine.step(&input)) {
             Ok(record) => record,
             Err(reason) => {
                 error = Some(reason);
                 break;
             }
         };
+        record.keep_tracks_in(&kept, step);
         if results.send(EngineMessage::Step { run, record: Box::new(record) }).is_err() {
             // The receiver is dropped when the session is closed.
             return;

@@ -166,10 +166,11 @@ fn joint_difference(a: &FrameStateReport, b: &FrameStateReport) -> Option<f64> {
 }
 
 fn track_difference(a: &StepRecord, b: &StepRecord) -> f64 {
-    if std::sync::Arc::ptr_eq(&a.tracks, &b.tracks) {
+    if a.tracks.is_same(&b.tracks) {
         return 0.0;
     }
-    let ids = |step: &StepRecord| step.tracks.features.iter().map(|feature| feature.id).collect::<BTreeSet<_>>();
+    let ids =
+        |step: &StepRecord| step.tracks.frame().features.iter().map(|feature| feature.id).collect::<BTreeSet<_>>();
     ids(a).symmetric_difference(&ids(b)).count() as f64
 }
 

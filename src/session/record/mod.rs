@@ -18,6 +18,7 @@ mod sigma_scale;
 mod solver_trace;
 mod step;
 mod step_columns;
+mod step_tracks;
 mod summary;
 mod trajectory_accuracy;
 mod trajectory_lane;
@@ -40,11 +41,12 @@ pub use pose_errors::{PoseConsistency, PoseError};
 pub use recording::Recording;
 pub use run::{ForkOrigin, PassProgress, RunMemory, RunRecord};
 pub use solver_trace::{SolverPosition, SolverTrace};
-pub(in crate::session) use step::tracks_bytes;
 #[cfg(test)]
 pub(in crate::session) use step::warnings_of;
 pub use step::{RunWarning, StepFactorRows, StepImage, StepRecord};
 pub use step_columns::{RankColumn, StepColumn};
+pub use step_tracks::StepTracks;
+pub(in crate::session) use step_tracks::{KeptTracks, tracks_bytes};
 pub use trajectory_accuracy::{
     RELATIVE_LENGTHS_M, RelativeAccuracy, TrajectoryAccuracy, TrajectoryEvaluation, evaluate_trajectory,
 };

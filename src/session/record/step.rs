@@ -1,16 +1,17 @@
 use std::sync::Arc;
 
+use super::step_tracks::{KeptTracks, StepTracks};
 use crate::estimator::{FactorRows, InformationGain, OTHER_CAMERA_FRAMES, StepReport, StepWarning, allocated_bytes};
-use crate::frontend::{FeatureId, TrackedFeature, TrackedFrame};
+use crate::frontend::{FeatureId, TrackedFeature};
 use crate::geometry::RigidTransform;
 use crate::observability::RankReport;
 
 /// Image of one camera in a step, with its feature tracks.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct StepImage {
     /// Index in the camera's stream, `None` where the camera has no image in the step.
     pub index: Option<usize>,
-    pub tracks: Arc<TrackedFrame>,
+    pub tracks: StepTracks,
 }
 
 /// One step of one run, with the tracks and ground truth of its images.
@@ -21,7 +22,7 @@ pub struct StepRecord {
     /// Observability of the calibration in this step, `None` during initialization.
     pub rank: Option<RankReport>,
     /// Feature tracks of the main camera; empty where it has no image.
-    pub tracks: Arc<TrackedFrame>,
+    pub tracks: StepTracks,
     /// Images of the run's further cameras, in their order.
     pub further_images: Vec<StepImage>,
     /// `world_from_imu` of the ground truth.
@@ -41,20 +42,28 @@ impl StepRecord {
     }
 
     /// Index and tracks of a camera's image in the step, `None` where it has none; 0 is the main camera.
-    pub fn image(&self, camera: usize) -> Option<(usize, &TrackedFrame)> {
+    pub fn image(&self, camera: usize) -> Option<(usize, &StepTracks)> {
         match camera.checked_sub(1) {
-            None => (self.report.frame_index < OTHER_CAMERA_FRAMES).then_some((self.report.frame_index, &*self.tracks)),
+            None => (self.report.frame_index < OTHER_CAMERA_FRAMES).then_some((self.report.frame_index, &self.tracks)),
             Some(further) => {
                 let image = self.further_images.get(further)?;
-                Some((image.index?, &*image.tracks))
+                Some((image.index?, &image.tracks))
             }
         }
     }
 
     /// A feature in the images of the step; the id has its camera.
-    pub fn track(&self, id: FeatureId) -> Option<&TrackedFeature> {
+    pub fn track(&self, id: FeatureId) -> Option<TrackedFeature> {
         let (_, tracks) = self.image(id.camera())?;
-        tracks.features.iter().find(|feature| feature.id.of_camera(id.camera()) == id)
+        tracks.frame().features.iter().find(|feature| feature.id.of_camera(id.camera()) == id).copied()
+    }
+
+    /// Leaves the tracks of all cameras to the measurements of the run's steps, of which this is the one with a number.
+    pub(in crate::session) fn keep_tracks_in(&mut self, all: &Arc<dyn KeptTracks>, step: usize) {
+        let further = self.further_images.iter_mut().map(|image| &mut image.tracks);
+        for (camera, tracks) in std::iter::once(&mut self.tracks).chain(further).enumerate() {
+            tracks.keep_in(all, step, camera);
+        }
     }
 
     /// Features of all cameras that are tracked from their previous images, and newly detected ones.
@@ -65,13 +74,13 @@ impl StepRecord {
 
     /// Number of features in the images of all cameras.
     pub fn feature_count(&self) -> usize {
-        self.tracks_of_all().map(|tracks| tracks.features.len()).sum()
+        self.tracks_of_all().map(|tracks| tracks.count).sum()
     }
 
     /// Tracks by camera, the main camera first; empty where an image is missing.
-    fn tracks_of_all(&self) -> impl Iterator<Item = &TrackedFrame> {
-        let further = self.further_images.iter().map(|image| &*image.tracks);
-        std::iter::once(&*self.tracks).chain(further)
+    fn tracks_of_all(&self) -> impl Iterator<Item = &StepTracks> {
+        let further = self.further_images.iter().map(|image| &image.tracks);
+        std::iter::once(&self.tracks).chain(further)
     }
 
     /// Memory in bytes without the tracks, which runs on the same camera share.
@@ -85,8 +94,9 @@ impl StepRecord {
             + allocated_bytes(self.further_images.capacity() * size_of::<StepImage>())
     }
 
+    /// Memory in bytes of the main camera's tracks, unless the measurements of the run's steps have them.
     pub fn tracks_bytes(&self) -> usize {
-        tracks_bytes(&self.tracks)
+        self.tracks.own_bytes()
     }
 }
 
@@ -96,12 +106,6 @@ pub struct StepFactorRows {
     pub step: usize,
     /// Rows by factor, `None` where the step has no window.
     pub rows: Option<Vec<FactorRows>>,
-}
-
-/// Heap memory of one camera's tracks behind an [`Arc`], in bytes.
-pub(in crate::session) fn tracks_bytes(tracks: &TrackedFrame) -> usize {
-    allocated_bytes(size_of::<TrackedFrame>() + 2 * size_of::<usize>())
-        + allocated_bytes((tracks.features.capacity() + tracks.matched.capacity()) * size_of::<TrackedFeature>())
 }
 
 /// A warning and the steps that reported it.

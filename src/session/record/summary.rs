@@ -53,7 +53,7 @@ impl StepRecord {
                 warnings: report.warnings.clone(),
             },
             rank: self.rank.clone(),
-            tracks: std::sync::Arc::clone(&self.tracks),
+            tracks: self.tracks.clone(),
             further_images: self.further_images.clone(),
             ground_truth: self.ground_truth,
             log_time_ns: self.log_time_ns,

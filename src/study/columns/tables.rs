@@ -107,7 +107,7 @@ impl<'a> FrameRow<'a> {
                 row.newest().map(|_| row.step.report.reprojection_rms_after_px)
             })
             .means("px", "reprojection RMS after the solve"),
-            FrameColumn::new("tracked", |row| row.step.tracks.features.len()).means("", "tracked features"),
+            FrameColumn::new("tracked", |row| row.step.tracks.count).means("", "tracked features"),
             FrameColumn::new("rank_structural", |row| Some(row.step.rank.as_ref()?.rank_structural))
                 .means("", "structural rank"),
             FrameColumn::new("rank_informed", |row| Some(row.step.rank.as_ref()?.rank_informed))

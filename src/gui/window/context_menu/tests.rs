@@ -133,7 +133,7 @@ fn a_run_a_feature_and_a_tab_have_menus() {
     // A feature of the image, which fills its area in one direction.
     let area = harness.get_by_label_contains("Image of ").rect();
     let recording = &harness.state().recording;
-    let feature = recording.runs[1].step_at(harness.state().cursor_ns).unwrap().tracks.features[5];
+    let feature = recording.runs[1].step_at(harness.state().cursor_ns).unwrap().tracks.frame().features[5];
     let [width, height] = recording.rig.cameras[0].model.resolution_px.map(|side| side as f32);
     let offset = egui::vec2(feature.uv_px.x as f32 - 0.5 * width, feature.uv_px.y as f32 - 0.5 * height);
     let at = area.center() + offset * (area.width() / width).min(area.height() / height);
