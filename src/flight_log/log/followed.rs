@@ -1,6 +1,6 @@
 //! A log that another program is writing: its index grows while it is read.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::thread;
@@ -152,11 +152,15 @@ impl FlightLog {
         self.following.as_ref()?.growth.lock().end
     }
 
-    /// Warning about a log whose writer has not completed it, `None` for any other log.
+    /// Warning about a log whose writer has not completed it, or goes on in another file; `None` for any other log.
     pub fn end_warning(&self) -> Option<LogWarning> {
         let after_s = seconds_from_ns(self.duration_ns());
         let problem = match self.end()? {
-            LogEnd::Complete => return None,
+            LogEnd::Complete => {
+                let next = next_part(&self.path).filter(|next| next.exists())?;
+                let name = next.file_name()?.to_string_lossy();
+                &*format!("the recording goes on in {name}, which is not followed: record it in one file")
+            }
             LogEnd::Idle => "nothing was written for 30 s, and the log has no footer: its writer has stopped",
             LogEnd::Stopped => "reading was ended before the log was complete",
             LogEnd::Limit => "a limit on the content of a log is reached (--limit)",
@@ -165,6 +169,14 @@ impl FlightLog {
         let message = format!("the log ends after second {after_s:.3}: {problem}; everything before it is used");
         Some(LogWarning::new(WarningKind::Damage, "", self.duration_ns(), message))
     }
+}
+
+/// Path of the part that follows a part of a split recording, `flight_1.mcap` after `flight_0.mcap`.
+fn next_part(path: &Path) -> Option<PathBuf> {
+    let (stem, extension) = (path.file_stem()?.to_str()?, path.extension()?.to_str()?);
+    let (name, number) = stem.rsplit_once('_')?;
+    let next = number.parse::<u32>().ok()?.checked_add(1)?;
+    Some(path.with_file_name(format!("{name}_{next}.{extension}")))
 }
 
 #[cfg(test)]
@@ -224,6 +236,20 @@ mod tests {
         assert_eq!(log.epoch_ns(), complete.epoch_ns());
         assert!((log.duration_ns() - complete.duration_ns()).abs() < 50_000_000, "{}", log.duration_ns());
         assert_eq!(complete.end(), None);
+    }
+
+    #[test]
+    fn a_recording_that_goes_on_in_another_file_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let part = |number: usize| folder.path().join(format!("flight_{number}.mcap"));
+        fs::write(part(1), "").unwrap();
+        let (log, _) = followed(&part(0), &sample());
+        assert_eq!(log.end(), Some(LogEnd::Complete));
+        let warning = log.end_warning().unwrap().message;
+        assert!(warning.contains("the recording goes on in flight_1.mcap, which is not followed"), "{warning}");
+        for (name, expected) in [("a_9.mcap", Some("a_10.mcap")), ("a.mcap", None), ("a_b.mcap", None)] {
+            assert_eq!(next_part(Path::new(name)), expected.map(PathBuf::from));
+        }
     }
 
     #[test]
