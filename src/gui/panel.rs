@@ -7,13 +7,12 @@ use egui::{Role, Sense, Ui};
 use serde::{Deserialize, Serialize};
 
 use super::derived::answers::Answers;
-use super::derived::flight::{FlightReport, FlightTables};
+use super::derived::flight::{FlightReport, FlightTables, NeededMotion};
 use super::derived::reading::Reading;
 use super::derived::slide::MovedChain;
 use super::theme::Theme;
 use crate::frontend::FeatureId;
 use crate::gimbal::{ParameterId, ParameterNames};
-use crate::observability::laboratory::SufficientMotion;
 use crate::observability::{ChainSlide, SlidePosition};
 use crate::session::breakpoints::Breakpoints;
 use crate::session::{
@@ -220,7 +219,7 @@ impl<'a> PanelContext<'a> {
     }
 
     /// Motion that brings the parameters of a run to the required accuracy; `None` as long as none is needed or known.
-    pub(crate) fn motion(&self, ui: &Ui, run: &RunRecord) -> Option<Arc<SufficientMotion>> {
+    pub(crate) fn motion(&self, ui: &Ui, run: &RunRecord) -> Option<NeededMotion> {
         self.selection.flight.motion(ui.ctx(), self.recording, run, &self.answer(run))
     }
 

@@ -10,7 +10,7 @@ use super::step_work::{REPAINT, StepWork};
 use crate::gimbal::ParameterId;
 use crate::gui::parameter_names::place_of;
 use crate::observability::Determination;
-use crate::observability::laboratory::{Advice, SufficientMotion};
+use crate::observability::laboratory::{ADVICE_DURATION_S, Advice, SufficientMotion};
 use crate::sensors::RequiredAccuracy;
 use crate::session::{Answer, FlightParameter, FlightVerdicts, Recording, RunRecord, StepRecord, Withheld, add_errors};
 
@@ -58,8 +58,19 @@ pub(crate) struct ParameterHistory {
     pub(crate) verdicts: Vec<Determination>,
 }
 
-/// Log time after which the motion that is still needed is computed again while the log is being written.
-const LIVE_PERIOD_NS: i64 = 2_000_000_000;
+/// Log time after which the motion that is still needed is computed again while the log is being written: a move has been
+/// flown by then.
+const LIVE_PERIOD_NS: i64 = (1e9 * ADVICE_DURATION_S) as i64;
+
+/// Motion that brings the parameters of a run to the required accuracy.
+#[derive(Clone, Debug)]
+pub(crate) struct NeededMotion {
+    pub(crate) motion: Arc<SufficientMotion>,
+    /// Step after which it begins.
+    pub(crate) after: Arc<StepRecord>,
+    /// Stamp of the newest step when it became known, in nanoseconds since the log began.
+    pub(crate) known_ns: i64,
+}
 
 #[derive(Debug, Default)]
 struct FlightTable {
@@ -71,6 +82,8 @@ struct FlightTable {
     history: Arc<DeterminationHistory>,
     advice: StepWork<Arc<Advice>>,
     motion: StepWork<Arc<SufficientMotion>>,
+    /// Step of the last result of `motion`, and stamp of the newest step when it was received.
+    motion_known: Option<(Arc<StepRecord>, i64)>,
     /// True if `motion` belongs to a flight that goes on.
     live: bool,
     /// True if `report` contains the motions of the last step's advice.
@@ -115,7 +128,7 @@ impl FlightTables {
         recording: &Recording,
         run: &RunRecord,
         answer: &Answer,
-    ) -> Option<Arc<SufficientMotion>> {
+    ) -> Option<NeededMotion> {
         let live = recording.is_being_written;
         if !(live || run.has_ended()) || !answer.needs_motion() {
             return None;
@@ -130,10 +143,11 @@ impl FlightTables {
             (table.live, table.motion) = (live, StepWork::default());
         }
         let step = table.verdicts.ranked_step()?;
-        let since_ns = table.motion.last().map(|(known, _)| step.report.stamp_ns - known.report.stamp_ns);
+        let newest_ns = step.report.stamp_ns;
+        let since_ns = table.motion_known.as_ref().map(|(_, known_ns)| newest_ns - known_ns);
         if live && (table.motion.is_busy() || since_ns.is_some_and(|since_ns| since_ns < LIVE_PERIOD_NS)) {
             table.motion.receive();
-            return table.motion.last()?.1.cloned();
+            return table.needed_motion(newest_ns);
         }
         table.motion.request(step, "motion", self.in_background, || {
             let (step, rig, camera) = (Arc::clone(step), Arc::clone(&recording.rig), run.camera_key.clone());
@@ -142,12 +156,22 @@ impl FlightTables {
         if table.motion.is_busy() {
             ctx.request_repaint_after(REPAINT);
         }
-        let (known, motion) = table.motion.last()?;
-        motion.filter(|_| live || Arc::ptr_eq(known, step)).cloned()
+        let is_of_step = table.motion.has_result(step);
+        table.needed_motion(newest_ns).filter(|_| live || is_of_step)
     }
 }
 
 impl FlightTable {
+    /// The motion that was computed last, at a stamp of the run's newest step.
+    fn needed_motion(&mut self, newest_ns: i64) -> Option<NeededMotion> {
+        let (after, motion) = self.motion.last()?;
+        if !self.motion_known.as_ref().is_some_and(|(step, _)| Arc::ptr_eq(step, after)) {
+            self.motion_known = Some((Arc::clone(after), newest_ns));
+        }
+        let (after, known_ns) = self.motion_known.clone()?;
+        Some(NeededMotion { motion: Arc::clone(motion?), after, known_ns })
+    }
+
     /// Reads the new steps of a run, and requests the suggested motions when it has ended.
     fn read(&mut self, recording: &Recording, run: &RunRecord, withheld: Option<Withheld>, in_background: bool) {
         let required = &recording.rig.required_accuracy;

@@ -37,7 +37,7 @@ pub(super) fn ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, actions: &mut Vec<Acti
             progress_ui(ui, ctx.commands, progress, &theme);
         }
         moved_chain_ui(ui, ctx);
-        let motion = if pending.is_none() { ctx.motion(ui, run) } else { None };
+        let motion = if pending.is_none() { ctx.motion(ui, run).map(|needed| needed.motion) } else { None };
         if let Some(motion) = &motion {
             motion_ui(ui, ctx, motion);
         }

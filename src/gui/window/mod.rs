@@ -15,6 +15,7 @@ mod figure_tests;
 #[cfg(test)]
 mod fit_tests;
 mod focus_ring;
+mod guidance;
 mod history;
 #[cfg(test)]
 mod keyboard_tests;
@@ -102,6 +103,15 @@ pub fn window_ui(ui: &mut Ui, state: &mut MainWindow, ctx: &mut PanelContext<'_>
         .exact_size(answer_bar::HEIGHT)
         .frame(bar)
         .show(ui, |ui| answer_bar::ui(ui, ctx, &mut actions));
+    if ctx.recording.is_being_written
+        && let Some(run) = ctx.selected_run()
+        && let Some(needed) = ctx.motion(ui, run)
+    {
+        egui::Panel::top("guidance")
+            .exact_size(guidance::HEIGHT)
+            .frame(bar)
+            .show(ui, |ui| guidance::ui(ui, ctx, run, &needed));
+    }
     notices::banner_ui(ui, ctx);
     if let Some(panel) = ctx.selection.wanted_panel.take() {
         state.tiles.show(panel);

@@ -37,7 +37,7 @@ impl Bench {
         &mut self.commands
     }
 
-    fn ui(&mut self, ui: &mut egui::Ui) {
+    pub(super) fn ui(&mut self, ui: &mut egui::Ui) {
         let theme = Theme::of(ThemeName::Dark);
         let mut context = PanelContext {
             recording: &self.recording,
