@@ -1,12 +1,13 @@
-use std::fmt::Debug;
+use std::fmt;
 use std::sync::{Arc, Weak};
 
 use crate::estimator::allocated_bytes;
 use crate::frontend::{FrontEndStatistics, TrackedFeature, TrackedFrame};
 
 /// Feature tracks of one camera's image in a step. The record of a long run does not own them: a run keeps the newest in
-/// memory and the others in a temporary file, from which they are read when they are drawn.
-#[derive(Clone, Debug)]
+/// memory and the others in a temporary file, from which they are read when they are drawn. They are printed alike
+/// wherever they are.
+#[derive(Clone)]
 pub struct StepTracks {
     /// Header stamp of the image, in nanoseconds since the log began.
     pub stamp_ns: i64,
@@ -16,7 +17,7 @@ pub struct StepTracks {
     place: TracksPlace,
 }
 
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 enum TracksPlace {
     Own(Arc<TrackedFrame>),
     /// Tracks of a camera in the measurements of a step.
@@ -29,7 +30,7 @@ enum TracksPlace {
 }
 
 /// Tracks of all steps of a run, in memory or in a file.
-pub(in crate::session) trait KeptTracks: Debug + Send + Sync {
+pub(in crate::session) trait KeptTracks: Send + Sync {
     /// Tracks of a camera in a step; `None` where they cannot be read.
     fn tracks(&self, step: usize, camera: usize) -> Option<Arc<TrackedFrame>>;
 }
@@ -47,7 +48,7 @@ impl StepTracks {
         found.unwrap_or_else(|| Arc::new(TrackedFrame { stamp_ns, statistics, ..TrackedFrame::default() }))
     }
 
-    /// True if both are the same tracks of one image, as those of two runs on one camera.
+    /// True if both are the same tracks of one image, as two runs on one camera have them.
     pub fn is_same(&self, other: &Self) -> bool {
         self.address() == other.address()
     }
@@ -74,6 +75,12 @@ impl StepTracks {
             TracksPlace::Own(tracks) => tracks_bytes(tracks),
             TracksPlace::Kept { .. } => 0,
         }
+    }
+}
+
+impl fmt::Debug for StepTracks {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.frame().fmt(formatter)
     }
 }
 

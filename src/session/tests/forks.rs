@@ -55,8 +55,6 @@ impl SimulatedRun {
 fn bits(record: &StepRecord) -> String {
     let mut record = record.clone();
     record.report.times = StageTimes::default();
-    // Wherever the tracks are kept.
-    record.tracks = record.tracks.frame().into();
     format!("{record:?}")
 }
 
