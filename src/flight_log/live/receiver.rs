@@ -11,7 +11,8 @@ use super::connection::{Connection, Delivery, Loss, READ};
 use super::protocol::{AdvertisedTopic, MessageData, STATUS_ERROR, ServerText, read_binary, read_text, subscribe};
 use super::reception::Reception;
 use crate::files::LogLimits;
-use crate::flight_log::writer::growing::{GrowingLog, TopicType};
+use crate::flight_log::writer::MessageType;
+use crate::flight_log::writer::growing::GrowingLog;
 use crate::flight_log::{LogError, MessageKind};
 
 /// Waits of [`READ`] between two attempts to connect: half a second.
@@ -290,13 +291,13 @@ impl<'a> Receiver<'a> {
                 }
             };
             let subscription = u32::try_from(self.channels.len()).unwrap_or(u32::MAX);
-            let channel = self.log()?.channel(&TopicType {
-                topic: topic.topic.clone(),
-                encoding: topic.encoding.clone(),
-                schema_name: topic.schema_name.clone(),
-                schema_language: topic.schema_language().to_owned(),
-                schema,
-            })?;
+            let message_type = MessageType {
+                name: &topic.schema_name,
+                definition_encoding: topic.schema_language(),
+                definition: schema.into(),
+                message_encoding: &topic.encoding,
+            };
+            let channel = self.log()?.channel(&topic.topic, &message_type)?;
             self.channels.insert(subscription, channel);
             self.subscribed.insert(topic.id);
             self.unheard.insert(subscription, topic.id);

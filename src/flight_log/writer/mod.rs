@@ -1,22 +1,21 @@
 //! Writer of flight logs: MCAP with CDR messages and their definitions, in the layout of ROS 2's recorder.
 
 mod encode;
+mod file;
 pub(super) mod growing;
 mod protobuf;
 mod results;
 mod schemas;
 
 pub use encode::Odometry;
+pub use file::MessageType;
 pub use results::{CircleAnnotation, LinesAnnotation, LogLevel, NamedTransform, Rgba};
 
-use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::error::Error;
-use std::io::{self, BufWriter};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use mcap::records::{MessageHeader, Metadata};
-use mcap::{Attachment, Compression, WriteOptions, Writer};
+use file::McapFile;
+use mcap::{Compression, WriteOptions};
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::{LogError, MessageKind};
@@ -56,96 +55,45 @@ pub struct MessageTimes {
     pub log_time_ns: i64,
 }
 
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct MessageType<'a> {
-    /// Name of the type, such as `nav_msgs/msg/Path`.
-    pub name: &'a str,
-    /// Language of the definition, `ros2msg`, `protobuf` or `jsonschema`.
-    pub definition_encoding: &'static str,
-    /// Definition with all types that it needs.
-    pub definition: Cow<'a, [u8]>,
-    /// Encoding of the messages, `cdr`, `protobuf` or `json`.
-    pub message_encoding: &'static str,
-}
-
-impl<'a> MessageType<'a> {
-    /// ROS 2 type with messages in CDR.
-    pub fn ros2(name: &'a str, definition: impl Into<Cow<'a, str>>) -> Self {
-        let definition = match definition.into() {
-            Cow::Borrowed(text) => Cow::Borrowed(text.as_bytes()),
-            Cow::Owned(text) => Cow::Owned(text.into_bytes()),
-        };
-        Self { name, definition_encoding: "ros2msg", definition, message_encoding: "cdr" }
-    }
-
-    /// Video frames of Foxglove in Protocol Buffers.
-    pub(in crate::flight_log) fn compressed_video() -> Self {
-        Self::protobuf(MessageKind::CompressedVideoProtobuf.schema_name(), protobuf::compressed_video_definition())
-    }
-
-    /// Message of protobuf with its `FileDescriptorSet`.
-    fn protobuf(name: &'a str, definition: Vec<u8>) -> Self {
-        Self { name, definition_encoding: "protobuf", definition: Cow::Owned(definition), message_encoding: "protobuf" }
-    }
-}
-
 /// Writes a log, message by message in the order of log times.
 pub struct LogWriter {
-    writer: Writer<BufWriter<OutputFile>>,
-    /// Channel and number of written messages by topic.
-    channels: BTreeMap<String, (u16, u32)>,
-    path: PathBuf,
+    file: McapFile<OutputFile>,
+    /// Channels by topic.
+    channels: BTreeMap<String, u16>,
 }
 
 impl std::fmt::Debug for LogWriter {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         formatter
             .debug_struct("LogWriter")
-            .field("path", &self.path)
+            .field("path", &self.path())
             .field("channels", &self.channels)
             .finish_non_exhaustive()
     }
 }
 
-/// Quality of service that ROS 2 recorders store for sensor topics; players need it.
-const QOS_PROFILE: &str = "\
-- history: 1
-  depth: 10
-  reliability: 1
-  durability: 2
-  deadline: {sec: 9223372036, nsec: 854775807}
-  lifespan: {sec: 9223372036, nsec: 854775807}
-  liveliness: 1
-  liveliness_lease_duration: {sec: 9223372036, nsec: 854775807}
-  avoid_ros_namespace_conventions: false
-";
-
 impl LogWriter {
     /// Starts a log under a temporary name; an older file stays until the log is finished.
     pub fn create(path: &Path, options: &LogWriterOptions) -> Result<Self, LogError> {
         let failed = |source| LogError::Io { action: "write the log", source, path: path.to_owned() };
-        let file = BufWriter::with_capacity(1 << 20, OutputFile::create(path).map_err(failed)?);
+        let file = OutputFile::create(path).map_err(failed)?;
         let compression = match options.compression {
             LogCompression::None => None,
             LogCompression::Lz4 => Some(Compression::Lz4),
             LogCompression::Zstd => Some(Compression::Zstd),
         };
         let write_options = WriteOptions::new()
-            .profile("ros2")
-            .library(concat!("dcvins ", env!("CARGO_PKG_VERSION")))
             .compression(compression)
-            .compression_threads(0) // the bytes must not depend on the machine
             .use_chunks(options.chunk_bytes.is_some())
             .chunk_size(options.chunk_bytes)
             .emit_summary_records(options.indexed)
             .emit_summary_offsets(options.indexed)
             .emit_message_indexes(options.indexed);
-        let writer = write_options.create(file).map_err(|error| write_error(path, &error))?;
-        Ok(Self { writer, channels: BTreeMap::new(), path: path.to_owned() })
+        Ok(Self { file: McapFile::start(file, path, write_options)?, channels: BTreeMap::new() })
     }
 
     pub(super) fn path(&self) -> &Path {
-        &self.path
+        self.file.path()
     }
 
     /// Writes an IMU sample: angular velocity in rad/s and specific force in m/s² (+g upwards while stationary), both in the
@@ -277,35 +225,24 @@ impl LogWriter {
         content: &(impl AsRef<[u8]> + ?Sized),
         log_time_ns: i64,
     ) -> Result<(), LogError> {
-        let attachment = Attachment {
-            log_time: log_time_ns.max(0) as u64,
-            create_time: log_time_ns.max(0) as u64,
-            name: name.to_owned(),
-            media_type: media_type.to_owned(),
-            data: Cow::Borrowed(content.as_ref()),
-        };
-        self.writer.attach(&attachment).map_err(|error| write_error(&self.path, &error))
+        self.file.attach(name, media_type, content.as_ref(), log_time_ns.max(0) as u64)
     }
 
     /// Writes named texts about the log as metadata, such as the experiment and its seed.
     pub fn write_metadata(&mut self, name: &str, texts: BTreeMap<String, String>) -> Result<(), LogError> {
-        let metadata = Metadata { name: name.to_owned(), metadata: texts };
-        self.writer.write_metadata(&metadata).map_err(|error| write_error(&self.path, &error))
+        self.file.write_metadata(name, texts)
     }
 
     /// Completes the file, replacing an older one.
     pub fn finish(self) -> Result<(), LogError> {
-        let path = self.path.clone();
+        let path = self.path().to_owned();
         let staged = self.finish_staged()?;
         staged.commit().map_err(|source| LogError::Io { action: "write the log", source, path })
     }
 
     /// Completes the file without the final rename, so that it can appear together with others.
-    pub fn finish_staged(mut self) -> Result<StagedFile, LogError> {
-        self.writer.finish().map_err(|error| write_error(&self.path, &error))?;
-        let flushed = self.writer.into_inner().into_inner().map_err(io::IntoInnerError::into_error);
-        let staged = flushed.and_then(OutputFile::stage);
-        staged.map_err(|source| LogError::Io { action: "write the log", source, path: self.path })
+    pub fn finish_staged(self) -> Result<StagedFile, LogError> {
+        self.file.finish("write the log", OutputFile::stage)
     }
 
     /// Writes an encoded message.
@@ -341,31 +278,15 @@ impl LogWriter {
     }
 
     fn add_channel(&mut self, topic: &str, message_type: &MessageType<'_>) -> Result<(), LogError> {
-        let failed = |error: mcap::McapError| write_error(&self.path, &error);
-        let MessageType { name, definition_encoding, definition, message_encoding } = message_type;
-        let schema = self.writer.add_schema(name, definition_encoding, definition).map_err(failed)?;
-        let qos = BTreeMap::from([("offered_qos_profiles".to_owned(), QOS_PROFILE.to_owned())]);
-        let id = self.writer.add_channel(schema, topic, message_encoding, &qos).map_err(failed)?;
-        self.channels.insert(topic.to_owned(), (id, 0));
+        let id = self.file.channel(topic, message_type)?;
+        self.channels.insert(topic.to_owned(), id);
         Ok(())
     }
 
     fn write_to_channel(&mut self, topic: &str, times: MessageTimes, message: &[u8]) -> Result<(), LogError> {
-        let (channel_id, sequence) = self.channels.entry(topic.to_owned()).or_default();
-        let log_time = times.log_time_ns.max(0) as u64;
-        let header = MessageHeader { channel_id: *channel_id, sequence: *sequence, log_time, publish_time: log_time };
-        *sequence = sequence.wrapping_add(1);
-        self.writer.write_to_known_channel(&header, message).map_err(|error| write_error(&self.path, &error))
+        let channel_id = *self.channels.entry(topic.to_owned()).or_default();
+        self.file.write(channel_id, times.log_time_ns.max(0) as u64, message)
     }
-}
-
-/// Error of the MCAP writer or the image encoder with its innermost cause, since theirs do not mention a full disk.
-fn write_error(path: &Path, error: &(dyn Error + 'static)) -> LogError {
-    let mut cause = error;
-    while let Some(source) = cause.source() {
-        cause = source;
-    }
-    LogError::Write { problem: cause.to_string(), path: path.to_owned() }
 }
 
 /// Encoders for tests of the decoders.
