@@ -76,10 +76,7 @@ pub(crate) fn open_log(
     }
     let started = SessionPlan::open(&session_request).and_then(|plan| {
         let mut session = Session::start(plan)?;
-        // A check needs the complete log.
-        if following.is_none() {
-            check(&mut session)?;
-        }
+        check(&mut session)?;
         Ok(session)
     });
     match started {

@@ -62,28 +62,71 @@ mod tests {
     use std::path::PathBuf;
 
     use super::*;
+    use crate::flight_log::FollowOptions;
+    use crate::log_check::Finding;
     use crate::session::{Session, SessionPlan, SessionRequest, Stopwatch};
 
-    #[test]
-    fn a_log_without_a_usable_image_is_checked() {
-        let request = SessionRequest {
-            log_path: PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../sample_logs/garden.mcap"),
-            duration_s: Some(0.5),
-            ..SessionRequest::default()
-        };
-        let mut plan = SessionPlan::open(&request).unwrap();
+    fn sample() -> PathBuf {
+        PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../sample_logs/garden.mcap")
+    }
+
+    /// A session that is checked in the background; no image has the size of the rig, so that no run has a step.
+    fn checked(request: &SessionRequest) -> Session {
+        let mut plan = SessionPlan::open(request).unwrap();
         for camera in &mut Arc::make_mut(&mut plan.rig).cameras {
             camera.model.resolution_px = [320, 240];
         }
         let mut session = Session::start(plan).unwrap();
         session.check_in_background(|log, rig| crate::log_check::check(log, Ok(rig), &[])).unwrap();
+        session
+    }
+
+    /// Findings of the check, which has to end in time.
+    fn findings(session: &mut Session) -> Arc<Vec<Finding>> {
         let begin = Stopwatch::start();
-        while session.recording().is_being_checked {
-            assert!(begin.elapsed_ms() < 20_000.0, "the check has not begun");
+        loop {
+            session.advance(0.0);
+            let recording = session.recording();
+            assert!(recording.runs.iter().all(|run| run.steps.is_empty()), "an image has the size of the rig");
+            if let Some(findings) = recording.check.clone().filter(|_| !recording.is_being_checked) {
+                return findings;
+            }
+            assert!(begin.elapsed_ms() < 60_000.0, "the check has not ended");
             std::thread::sleep(WAIT);
         }
-        let recording = session.recording();
-        assert!(recording.runs.iter().all(|run| run.steps.is_empty()), "no image has the size of the rig");
-        assert!(recording.check.is_some());
+    }
+
+    #[test]
+    fn a_log_without_a_usable_image_is_checked() {
+        let request = SessionRequest { log_path: sample(), duration_s: Some(0.5), ..SessionRequest::default() };
+        let mut session = checked(&request);
+        assert!(session.recording().is_being_checked);
+        findings(&mut session);
+    }
+
+    #[test]
+    fn a_log_that_is_being_written_is_checked_once_it_has_ended() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("live.mcap");
+        let bytes = std::fs::read(sample()).unwrap();
+        let (first, rest) = bytes.split_at(bytes.len() / 2);
+        std::fs::write(&path, first).unwrap();
+        let request = SessionRequest {
+            log_path: path.clone(),
+            rig_path: Some(sample().with_file_name("garden.rig.yaml")),
+            following: Some(FollowOptions::default()),
+            ..SessionRequest::default()
+        };
+        let mut session = checked(&request);
+        for _ in 0..4 {
+            session.advance(0.0);
+            std::thread::sleep(WAIT);
+            assert!(!session.recording().is_being_checked && session.recording().check.is_none());
+        }
+        let mut file = std::fs::OpenOptions::new().append(true).open(&path).unwrap();
+        std::io::Write::write_all(&mut file, rest).unwrap();
+        let of_followed = findings(&mut session);
+        let of_complete = findings(&mut checked(&SessionRequest { following: None, ..request }));
+        assert_eq!(of_followed, of_complete);
     }
 }

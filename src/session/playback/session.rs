@@ -84,7 +84,7 @@ impl Session {
     }
 
     /// Calls `check` with the log and its rig on a thread of its own, after the first step; the findings appear in the
-    /// record.
+    /// record. A log that is being written is checked once it has ended.
     ///
     /// # Errors
     /// If no thread can be started.
@@ -92,9 +92,14 @@ impl Session {
         &mut self,
         check: impl FnOnce(&Arc<FlightLog>, &Rig) -> CheckReport + Send + 'static,
     ) -> Result<(), SessionError> {
-        let (has_begun, store) = self.shared.receiver_of_check();
         let (log, rig) = (Arc::clone(&self.plan.log), Arc::clone(&self.plan.rig));
-        let check = move || check(&log, &rig);
+        let (has_begun, store) = self.shared.receiver_of_check(&log);
+        let check = move || {
+            // Topics, rates and warnings of a log that was being written are those of its first seconds.
+            let complete =
+                if log.is_followed() { FlightLog::open_with(log.path(), log.file().limits()).ok() } else { None };
+            check(&complete.map_or(log, Arc::new), &rig)
+        };
         self.check = Some(BackgroundCheck::start(check, has_begun, store)?);
         Ok(())
     }

@@ -8,6 +8,7 @@ use std::thread::{Builder, JoinHandle};
 
 use parking_lot::Mutex;
 
+use crate::flight_log::FlightLog;
 use crate::log_check::CheckReport;
 use crate::session::engine::{Computation, EngineMessage, RecomputeRequest, Recomputed};
 use crate::session::plan::SessionError;
@@ -73,17 +74,29 @@ impl SharedComputation {
         }
     }
 
-    /// Function that stores the findings of the check, and one that is true once a run has a step.
+    /// Function that is true once the check of a log may begin, when a run has a step and the log has ended, and one that
+    /// stores its findings.
     pub(super) fn receiver_of_check(
         &self,
+        log: &Arc<FlightLog>,
     ) -> (impl Fn() -> bool + Send + 'static, impl FnOnce(CheckReport) + Send + 'static) {
         let (state, known) = (Arc::clone(&self.state), Arc::clone(&self.state));
-        self.change(Computation::begin_check);
+        let followed = log.is_followed().then(|| Arc::clone(log));
+        if followed.is_none() {
+            self.change(Computation::begin_check);
+        }
         let has_begun = move || {
-            let computation = known.computation.lock();
-            let runs = &computation.recording().runs;
+            if followed.as_ref().is_some_and(|log| log.end().is_none()) {
+                return false;
+            }
+            let recording = Arc::clone(known.computation.lock().recording());
             // A run without a usable image ends without any step.
-            runs.iter().any(|run| !run.steps.is_empty()) || runs.iter().all(RunRecord::has_ended)
+            let begins = recording.runs.iter().any(|run| !run.steps.is_empty())
+                || recording.runs.iter().all(RunRecord::has_ended);
+            if begins && followed.is_some() {
+                known.change(Computation::begin_check);
+            }
+            begins
         };
         let store = move |checked| {
             state.change(|computation| computation.set_check(checked));
