@@ -206,7 +206,7 @@ fn follow(
     }
     notify(&format!("dcvins: followed {:.1} s of log, {delay}", seconds_from_ns(plan.log.duration_ns())));
     // The plan has topics, rates and ground truth of the first seconds.
-    let complete = SessionPlan::open(request)?;
+    let complete = SessionPlan::of_log(request, Arc::new(plan.log.reopened()?))?;
     let recording = computation.into_recording().of_complete_log(&complete);
     if arguments.no_check {
         return Ok(recording);

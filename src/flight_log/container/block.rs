@@ -1,3 +1,4 @@
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -16,6 +17,8 @@ pub(crate) struct Block {
     pub(crate) is_chunk: bool,
     /// Smallest and largest log time of the messages.
     pub(crate) log_time_ns: (u64, u64),
+    /// Channel of the index for each channel of the file, in a file in which a recording goes on.
+    pub(crate) renumbered: Option<Arc<BTreeMap<u16, u16>>>,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -51,7 +54,17 @@ impl DecodedBlock {
             file.read(block.bytes.start..end).map(|bytes| (bytes, None))
         };
         match read {
-            Ok((records, damage)) => Self::from_records(records, damage),
+            Ok((records, damage)) => {
+                let mut decoded = Self::from_records(records, damage);
+                if let Some(known) = &block.renumbered {
+                    decoded.messages.retain_mut(|message| {
+                        let indexed = known.get(&message.channel_id).copied();
+                        message.channel_id = indexed.unwrap_or(message.channel_id);
+                        indexed.is_some()
+                    });
+                }
+                decoded
+            }
             Err(damage) => {
                 Self { records: Vec::new(), messages: Vec::new(), definitions: Vec::new(), damage: Some(damage) }
             }

@@ -4,6 +4,8 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use parking_lot::RwLock;
+
 use crate::files::{LimitExceeded, LimitKind, LogLimits};
 use crate::flight_log::LogError;
 
@@ -17,10 +19,25 @@ const UNPACK_BYTES: usize = 1 << 20;
 /// Bytes of a log, read from the file on demand: a file that another process shortens gives an error.
 #[derive(Debug)]
 pub struct LogFile {
-    file: File,
+    /// The file, and those in which its recording goes on, as if they were one.
+    parts: RwLock<Vec<Part>>,
     /// In bytes, when the file was opened, or when a log that is being written was looked at last.
     length: AtomicUsize,
     limits: LogLimits,
+}
+
+#[derive(Debug)]
+struct Part {
+    /// Number of bytes before it.
+    start: usize,
+    file: File,
+}
+
+impl Part {
+    /// Length in bytes, 0 if it cannot be read.
+    fn length(&self) -> usize {
+        self.file.metadata().map_or(0, |metadata| usize::try_from(metadata.len()).unwrap_or(0))
+    }
 }
 
 impl LogFile {
@@ -51,7 +68,8 @@ impl LogFile {
         }
         let length = file.metadata().map_err(failed)?.len();
         let length = usize::try_from(length).map_err(|error| failed(io::Error::other(error)))?;
-        Ok(Self { file, length: AtomicUsize::new(length), limits: limits.clone() })
+        let parts = RwLock::new(vec![Part { start: 0, file }]);
+        Ok(Self { parts, length: AtomicUsize::new(length), limits: limits.clone() })
     }
 
     /// Length in bytes when the file was opened, or looked at last.
@@ -61,8 +79,25 @@ impl LogFile {
 
     /// Looks at the length of a file that is being written.
     pub(crate) fn grow(&self) {
-        let now = self.file.metadata().map_or(0, |metadata| usize::try_from(metadata.len()).unwrap_or(0));
+        let now = self.parts.read().last().map_or(0, |last| last.start + last.length());
         self.length.fetch_max(now, Ordering::AcqRel);
+    }
+
+    /// Adds the file in which the recording goes on after the last part, which is complete; returns its start.
+    pub(crate) fn append(&self, next: Self) -> usize {
+        let start = self.len();
+        let added = next.parts.into_inner().into_iter().map(|part| Part { start: start + part.start, ..part });
+        self.parts.write().extend(added);
+        self.length.fetch_max(start + next.length.into_inner(), Ordering::AcqRel);
+        start
+    }
+
+    /// The same file, for another reader.
+    pub(crate) fn reopened(&self) -> io::Result<Self> {
+        let parts = self.parts.read();
+        let parts = parts.iter().map(|part| Ok(Part { start: part.start, file: part.file.try_clone()? }));
+        let parts = RwLock::new(parts.collect::<io::Result<_>>()?);
+        Ok(Self { parts, length: AtomicUsize::new(self.len()), limits: self.limits.clone() })
     }
 
     /// Limits that apply to reading the file.
@@ -86,13 +121,16 @@ impl LogFile {
 
     /// Fills a buffer with the bytes from `start` on.
     fn read_into(&self, start: usize, buffer: &mut [u8]) -> Result<(), String> {
+        let parts = self.parts.read();
         let mut done = 0;
         while done < buffer.len() {
-            match read_at(&self.file, &mut buffer[done..], (start + done) as u64) {
-                Ok(0) => {
-                    let end = self.file.metadata().map_or(start + done, |metadata| metadata.len() as usize);
-                    return Err(self.shrunk(end));
-                }
+            let at = start + done;
+            let number = parts.partition_point(|part| part.start <= at).saturating_sub(1);
+            let Part { start: begin, file } = &parts[number];
+            let end = parts.get(number + 1).map_or(usize::MAX, |next| next.start);
+            let wanted = (buffer.len() - done).min(end - at);
+            match read_at(file, &mut buffer[done..done + wanted], (at - begin) as u64) {
+                Ok(0) => return Err(self.shrunk(begin + parts[number].length())),
                 Ok(count) => done += count,
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
                 Err(error) => return Err(format!("byte {} cannot be read ({error})", start + done)),
@@ -111,10 +149,13 @@ impl LogFile {
     /// Returns an error if the file is shorter than when it was opened.
     pub(crate) fn require_unshortened(&self, path: &Path) -> Result<(), LogError> {
         let failed = |source| LogError::Io { action: "read the log", source, path: path.to_owned() };
-        let now = self.file.metadata().map_err(failed)?.len();
-        if now < self.len() as u64 {
-            let problem = self.shrunk(now as usize);
-            return Err(LogError::Shortened { problem, path: path.to_owned() });
+        let parts = self.parts.read();
+        let ends = parts.iter().skip(1).map(|next| next.start).chain([self.len()]);
+        for (part, end) in parts.iter().zip(ends) {
+            let now = part.start + part.file.metadata().map_err(failed)?.len() as usize;
+            if now < end {
+                return Err(LogError::Shortened { problem: self.shrunk(now), path: path.to_owned() });
+            }
         }
         Ok(())
     }

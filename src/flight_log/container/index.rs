@@ -13,6 +13,8 @@ use crate::files::{LimitExceeded, LimitKind};
 
 /// Channel (2 bytes) and size of the list (4) of a message index.
 const MESSAGE_INDEX_HEAD: usize = 6;
+/// Footer: opcode, length, summary start (8 bytes), summary offsets' start (8), checksum (4); the magic follows.
+const FOOTER_BYTES: usize = RECORD_HEADER + 20;
 const NO_END_MAGIC: &str = "the file does not end with the MCAP magic";
 /// Messages outside of chunks are gathered into blocks of about this size.
 const PLAIN_BLOCK_BYTES: usize = 1 << 20;
@@ -43,6 +45,16 @@ struct Definitions {
     bytes: usize,
     /// Rejected channels, reported once.
     refused: BTreeSet<u16>,
+    /// Channel of the index for each channel of the file, in a file in which a recording goes on; `None` in the first file,
+    /// where both are the same.
+    renumbered: Option<Arc<BTreeMap<u16, u16>>>,
+}
+
+impl Definitions {
+    /// Channel of the index for a channel of the file; `None` if that is not defined.
+    fn indexed(&self, channel_id: u16) -> Option<u16> {
+        self.renumbered.as_ref().map_or(Some(channel_id), |known| known.get(&channel_id).copied())
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -92,6 +104,19 @@ pub(crate) struct ScanState {
 impl Default for ScanState {
     fn default() -> Self {
         Self { position: MAGIC.len(), definitions: Definitions::default() }
+    }
+}
+
+impl ScanState {
+    /// Scan of a file in which a recording goes on, with definitions of its own.
+    pub(crate) fn of_part(start: usize) -> Self {
+        let definitions = Definitions { renumbered: Some(Arc::default()), ..Definitions::default() };
+        Self { position: start + MAGIC.len(), definitions }
+    }
+
+    /// Smallest length of a log of which the footer has been reached.
+    pub(crate) fn complete_bytes(&self) -> usize {
+        self.position + FOOTER_BYTES + MAGIC.len()
     }
 }
 
@@ -152,9 +177,7 @@ impl ContainerIndex {
 
     /// Reads the index at the end of the file. The error is the damage to report, `None` for a file without index.
     fn from_summary(file: &LogFile) -> Result<Self, Option<String>> {
-        // Footer: opcode, length, summary start (8 bytes), summary offsets' start (8), checksum (4); then the magic.
-        const FOOTER: usize = RECORD_HEADER + 20;
-        let footer_start = file.len().checked_sub(FOOTER + MAGIC.len()).filter(|start| *start >= MAGIC.len());
+        let footer_start = file.len().checked_sub(FOOTER_BYTES + MAGIC.len()).filter(|start| *start >= MAGIC.len());
         let Some(footer_start) = footer_start else {
             return Err(Some(NO_END_MAGIC.into()));
         };
@@ -193,7 +216,7 @@ impl ContainerIndex {
                         return Err(Some(format!("the index places a chunk at byte {}", chunk.chunk_start_offset)));
                     };
                     let log_time_ns = (chunk.message_start_time, chunk.message_end_time);
-                    index.blocks.push(Block { bytes, is_chunk: true, log_time_ns });
+                    index.blocks.push(Block { bytes, is_chunk: true, log_time_ns, renumbered: None });
                     let offsets = chunk.message_index_offsets.iter();
                     let entries =
                         offsets.filter_map(|(id, at)| Some((*id, Entries::Record(usize::try_from(*at).ok()?))));
@@ -272,12 +295,12 @@ impl ContainerIndex {
                 op::CHUNK => self.scan_chunk(file, position..end, definitions),
                 op::MESSAGE => {
                     let header = window.read(body.start..body.end.min(body.start + MESSAGE_HEADER));
-                    self.scan_plain_message(position, end, header.unwrap_or_default());
+                    self.scan_plain_message(position, end, header.unwrap_or_default(), definitions);
                 }
                 // Entries of readable blocks exist already; only the counts of damaged blocks are needed.
                 op::MESSAGE_INDEX => {
                     if let Ok(head) = window.read(body.start..body.end.min(body.start + MESSAGE_INDEX_HEAD)) {
-                        self.scan_message_index(head);
+                        self.scan_message_index(head, definitions);
                     }
                 }
                 op::FOOTER => return ScanEnd::Footer,
@@ -311,7 +334,7 @@ impl ContainerIndex {
     }
 
     fn scan_chunk(&mut self, file: &LogFile, bytes: Range<usize>, definitions: &mut Definitions) {
-        let mut block = Block { bytes, is_chunk: true, log_time_ns: (0, 0) };
+        let mut block = Block { bytes, is_chunk: true, log_time_ns: (0, 0), renumbered: None };
         if let Ok((ChunkHeader { message_start_time, message_end_time, .. }, _)) = chunk_header(file, &block) {
             block.log_time_ns = (message_start_time, message_end_time);
         }
@@ -321,6 +344,7 @@ impl ContainerIndex {
                 self.define(file, definitions, &record, block.bytes.start);
             }
         }
+        block.renumbered.clone_from(&definitions.renumbered);
         let mut entries: BTreeMap<u16, Entries> = BTreeMap::new();
         let log_times = || decoded.messages.iter().map(|message| message.log_time_ns);
         if let (Some(first), Some(last)) = (log_times().min(), log_times().max()) {
@@ -330,9 +354,8 @@ impl ContainerIndex {
         }
         for message in &decoded.messages {
             let entry = (message.log_time_ns, message.offset as u64);
-            if let Entries::Scanned(list) =
-                entries.entry(message.channel_id).or_insert_with(|| Entries::Scanned(Vec::new()))
-            {
+            let Some(channel_id) = definitions.indexed(message.channel_id) else { continue };
+            if let Entries::Scanned(list) = entries.entry(channel_id).or_insert_with(|| Entries::Scanned(Vec::new())) {
                 list.push(entry);
             }
         }
@@ -346,11 +369,12 @@ impl ContainerIndex {
     }
 
     /// Stores the number of messages of a message index record after a damaged chunk.
-    fn scan_message_index(&mut self, head: &[u8]) {
+    fn scan_message_index(&mut self, head: &[u8], definitions: &Definitions) {
         let Some(number) = self.blocks.len().checked_sub(1) else { return };
         if let (Some(promises), &[c0, c1, s0, s1, s2, s3]) = (self.scanned_promises.get_mut(&number), head) {
             let count = u32::from_le_bytes([s0, s1, s2, s3]) / 16;
-            promises.insert(u16::from_le_bytes([c0, c1]), u64::from(count));
+            let channel_id = definitions.indexed(u16::from_le_bytes([c0, c1]));
+            promises.extend(channel_id.map(|id| (id, u64::from(count))));
         }
     }
 
@@ -364,22 +388,25 @@ impl ContainerIndex {
         self.damages.truncate(damages); // the caller reports the cut
     }
 
-    fn scan_plain_message(&mut self, position: usize, end: usize, header: &[u8]) {
+    fn scan_plain_message(&mut self, position: usize, end: usize, header: &[u8], definitions: &Definitions) {
         let Some((channel_id, log_time_ns)) = message_header(header) else {
             self.report(position, format!("a message record of {} bytes", end - position - RECORD_HEADER));
             return;
         };
+        let Some(channel_id) = definitions.indexed(channel_id) else { return };
         let grows = self.blocks.last().is_some_and(|block| {
             !block.is_chunk && block.bytes.end == position && position - block.bytes.start < PLAIN_BLOCK_BYTES
         });
         if !grows || !self.extends_last {
-            self.blocks.push(Block { bytes: position..end, is_chunk: false, log_time_ns: (log_time_ns, log_time_ns) });
+            let log_time_ns = (log_time_ns, log_time_ns);
+            self.blocks.push(Block { bytes: position..end, is_chunk: false, log_time_ns, renumbered: None });
             self.entries.push(Arc::default());
             self.extends_last = true;
         }
         self.scanned_messages += 1;
         if let (Some(block), Some(entries)) = (self.blocks.last_mut(), self.entries.last_mut()) {
             block.bytes.end = end;
+            block.renumbered.clone_from(&definitions.renumbered);
             block.log_time_ns.0 = block.log_time_ns.0.min(log_time_ns);
             block.log_time_ns.1 = block.log_time_ns.1.max(log_time_ns);
             let offset = (position - block.bytes.start) as u64;
@@ -414,7 +441,15 @@ impl ContainerIndex {
                     encoding: channel.message_encoding.clone(),
                     definition: schema.and_then(|schema| schema.definition.clone()),
                 };
-                let problem = match self.channels.get(&channel.id) {
+                let id = match &mut definitions.renumbered {
+                    None => channel.id,
+                    Some(known) => *Arc::make_mut(known).entry(channel.id).or_insert_with(|| {
+                        let same = self.channels.iter().find(|(_, other)| **other == taken);
+                        let next = || self.channels.last_key_value().map_or(0, |(last, _)| last.saturating_add(1));
+                        same.map_or_else(next, |(id, _)| *id)
+                    }),
+                };
+                let problem = match self.channels.get(&id) {
                     Some(known) if *known == taken => return,
                     Some(known) => Some(format!(
                         "channel {} is defined again as {:?}; its first definition, {:?}, is used",
@@ -428,7 +463,7 @@ impl ContainerIndex {
                 };
                 match problem {
                     None => {
-                        self.channels.insert(channel.id, taken);
+                        self.channels.insert(id, taken);
                     }
                     Some(problem) if definitions.refused.insert(channel.id) => self.report(byte, problem),
                     Some(_) => {}
@@ -438,10 +473,14 @@ impl ContainerIndex {
         }
     }
 
+    /// Smallest log time, `None` without messages.
+    pub(crate) fn first_log_time_ns(&self) -> Option<u64> {
+        self.blocks.iter().map(|block| block.log_time_ns.0).min()
+    }
+
     /// Time from the first to the last message.
     pub(crate) fn span_ns(&self) -> u64 {
-        let first = self.blocks.iter().map(|block| block.log_time_ns.0).min().unwrap_or(0);
-        self.last_log_time_ns() - first
+        self.last_log_time_ns() - self.first_log_time_ns().unwrap_or(0)
     }
 
     /// Largest log time, 0 without messages.

@@ -1,6 +1,6 @@
 //! A log that another program is writing: its index grows while it is read.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::thread;
@@ -46,9 +46,9 @@ impl FlightLog {
             thread::sleep(POLL);
         };
         check_magic(&file, path)?;
-        let (mut index, mut growth) = (ContainerIndex::default(), Growth::new(patience));
+        let (mut index, mut growth) = (ContainerIndex::default(), Growth::new(path, patience));
         while growth.end.is_none() && index.span_ns() < BEGIN_NS {
-            if !(growth.has_news(&file, &follow) && growth.grow(&file, &mut index)) {
+            if !(growth.has_news(&file, &index, &follow) && growth.grow(&file, &mut index)) {
                 growth.polls += 1;
                 thread::sleep(POLL);
             }
@@ -76,10 +76,11 @@ impl FlightLog {
 
     /// Adds to the index what has been written since; true if there are more blocks.
     fn look(&self, growth: &mut Growth, follow: &FollowOptions) -> bool {
-        if !growth.has_news(&self.file, follow) {
+        let known = self.index();
+        if !growth.has_news(&self.file, &known, follow) {
             return false;
         }
-        let mut index = ContainerIndex::clone(&self.index());
+        let mut index = ContainerIndex::clone(&known);
         let has_grown = growth.grow(&self.file, &mut index);
         if has_grown {
             self.duration_ns.fetch_max(self.since_start(index.last_log_time_ns()), Ordering::Relaxed);
@@ -152,15 +153,24 @@ impl FlightLog {
         self.following.as_ref()?.growth.lock().end
     }
 
-    /// Warning about a log whose writer has not completed it, or goes on in another file; `None` for any other log.
+    /// The log with all that has been written until now, with its topics, rates and warnings.
+    ///
+    /// # Errors
+    /// As [`FlightLog::open`].
+    pub fn reopened(&self) -> Result<Self, LogError> {
+        let failed = |source| LogError::Io { action: "open the log again", source, path: self.path.clone() };
+        let file = self.file.reopened().map_err(failed)?;
+        // The index at the end of a complete file knows more than a scan, such as the number of messages.
+        let is_part = self.following.as_ref().is_some_and(|following| following.growth.lock().part() != self.path);
+        let index = if is_part { ContainerIndex::clone(&self.index()) } else { ContainerIndex::read(&file) };
+        Self::of(&self.path, file, index, None)
+    }
+
+    /// Warning about a log whose writer has not completed it; `None` for any other log.
     pub fn end_warning(&self) -> Option<LogWarning> {
         let after_s = seconds_from_ns(self.duration_ns());
         let problem = match self.end()? {
-            LogEnd::Complete => {
-                let next = next_part(&self.path).filter(|next| next.exists())?;
-                let name = next.file_name()?.to_string_lossy();
-                &*format!("the recording goes on in {name}, which is not followed: record it in one file")
-            }
+            LogEnd::Complete => return None,
             LogEnd::Idle => "nothing was written for 30 s, and the log has no footer: its writer has stopped",
             LogEnd::Stopped => "reading was ended before the log was complete",
             LogEnd::Limit => "a limit on the content of a log is reached (--limit)",
@@ -171,25 +181,19 @@ impl FlightLog {
     }
 }
 
-/// Path of the part that follows a part of a split recording, `flight_1.mcap` after `flight_0.mcap`.
-fn next_part(path: &Path) -> Option<PathBuf> {
-    let (stem, extension) = (path.file_stem()?.to_str()?, path.extension()?.to_str()?);
-    let (name, number) = stem.rsplit_once('_')?;
-    let next = number.parse::<u32>().ok()?.checked_add(1)?;
-    Some(path.with_file_name(format!("{name}_{next}.{extension}")))
-}
-
 #[cfg(test)]
 mod tests {
+    use std::borrow::Cow;
     use std::fs::{self, File};
     use std::io::Write as _;
     use std::time::Duration;
 
     use super::*;
     use crate::files::RigFile as _;
-    use crate::flight_log::{FrameStream, MessageKind, SensorFrame};
+    use crate::flight_log::writer::growing::GrowingLog;
+    use crate::flight_log::{FrameStream, MessageKind, MessageType, SensorFrame};
 
-    const IMPATIENT: Patience = Patience { idle_polls: 10, stopped_ns: 2_000_000_000 };
+    const IMPATIENT: Patience = Patience { idle_polls: 10, next_polls: 50, stopped_ns: 2_000_000_000 };
 
     fn sample() -> Vec<u8> {
         fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../../sample_logs/garden.mcap")).unwrap()
@@ -238,18 +242,73 @@ mod tests {
         assert_eq!(complete.end(), None);
     }
 
+    /// Writes the messages of the sample log between two log times; channels are numbered after the other topics.
+    fn write_part(path: &Path, other_topics: &[&str], is_part: impl Fn(u64) -> bool) {
+        let bytes = sample();
+        let mut part = GrowingLog::create(path).unwrap();
+        for topic in other_topics {
+            part.channel(topic, &MessageType::ros2("std_msgs/msg/String", "string data")).unwrap();
+        }
+        for message in mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap) {
+            let schema = message.channel.schema.as_ref().unwrap();
+            let message_type = MessageType {
+                name: &schema.name,
+                definition_encoding: &schema.encoding,
+                definition: Cow::Borrowed(&schema.data),
+                message_encoding: &message.channel.message_encoding,
+            };
+            let channel = part.channel(&message.channel.topic, &message_type).unwrap();
+            if is_part(message.log_time) {
+                part.write(channel, message.log_time, &message.data).unwrap();
+            }
+        }
+        part.finish().unwrap();
+    }
+
     #[test]
-    fn a_recording_that_goes_on_in_another_file_is_named() {
+    fn a_recording_goes_on_in_the_next_file_with_other_channels() {
         let folder = tempfile::tempdir().unwrap();
         let part = |number: usize| folder.path().join(format!("flight_{number}.mcap"));
-        fs::write(part(1), "").unwrap();
-        let (log, _) = followed(&part(0), &sample());
-        assert_eq!(log.end(), Some(LogEnd::Complete));
-        let warning = log.end_warning().unwrap().message;
-        assert!(warning.contains("the recording goes on in flight_1.mcap, which is not followed"), "{warning}");
-        for (name, expected) in [("a_9.mcap", Some("a_10.mcap")), ("a.mcap", None), ("a_b.mcap", None)] {
-            assert_eq!(next_part(Path::new(name)), expected.map(PathBuf::from));
-        }
+        let complete_path = folder.path().join("complete.mcap");
+        fs::write(&complete_path, sample()).unwrap();
+        let complete = Arc::new(FlightLog::open(&complete_path).unwrap());
+        let (begin_ns, end_ns) = (complete.epoch_ns() as u64, complete.index().last_log_time_ns());
+        // A log that is being written is opened after three seconds.
+        let [first_ns, second_ns] = [0.5, 0.75].map(|ratio| begin_ns + ((end_ns - begin_ns) as f64 * ratio) as u64);
+        write_part(&part(0), &[], |time_ns| time_ns < first_ns);
+        let patience = Patience { idle_polls: 200, next_polls: 200, ..IMPATIENT };
+        let follow = || FlightLog::follow(&part(0), &LogLimits::default(), FollowOptions::default(), patience);
+        let yaml = include_str!("../../../sample_logs/garden.rig.yaml");
+        let rig = crate::sensors::Rig::from_yaml(yaml, Path::new("garden.rig.yaml")).unwrap();
+        let content = |log: &Arc<FlightLog>| {
+            let mut stream = FrameStream::with_motion_after(Arc::clone(log), &rig, "cam0", 0.0, None, 0.06).unwrap();
+            let frames = std::iter::from_fn(|| stream.next_frame());
+            frames.map(|frame| (frame.stamp_ns, frame.imu, frame.image)).collect::<Vec<_>>()
+        };
+        let log = Arc::new(follow().unwrap());
+        let followed = thread::scope(|scope| {
+            let reader = scope.spawn(|| content(&log));
+            thread::sleep(POLL);
+            write_part(&part(1), &["/a", "/b"], |time_ns| (first_ns..second_ns).contains(&time_ns));
+            write_part(&part(2), &["/c"], |time_ns| time_ns >= second_ns);
+            reader.join().unwrap()
+        });
+        assert!(followed == content(&complete));
+        assert_eq!((log.end(), log.end_warning()), (Some(LogEnd::Complete), None));
+        let reopened = log.reopened().unwrap();
+        assert_eq!((reopened.is_followed(), reopened.duration_ns()), (false, complete.duration_ns()));
+        let counts = |log: &FlightLog| log.topics().iter().map(|it| (it.topic.clone(), it.count)).collect::<Vec<_>>();
+        assert_eq!(counts(&reopened), counts(&complete));
+    }
+
+    #[test]
+    fn the_next_file_of_another_flight_is_not_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let part = |number: usize| folder.path().join(format!("flight_{number}.mcap"));
+        fs::write(part(1), sample()).unwrap();
+        let (log, times) = followed(&part(0), &sample());
+        assert_eq!(times, log_times(&FlightLog::open(&part(0)).unwrap()));
+        assert_eq!((log.end(), log.end_warning()), (Some(LogEnd::Complete), None));
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Growth of a log that another program is writing.
 
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -20,14 +21,16 @@ pub(super) const BEGIN_NS: u64 = 3_000_000_000;
 pub(super) struct Patience {
     /// Number of looks without growth after which a log without a footer is taken as ended.
     pub(super) idle_polls: u32,
+    /// Number of looks for the next file of a split recording after the end of one.
+    pub(super) next_polls: u32,
     /// Log time by which other topics are ahead of a topic that has ended.
     pub(super) stopped_ns: u64,
 }
 
 impl Default for Patience {
-    /// Half a minute, and ten seconds.
+    /// Half a minute, a second, and ten seconds.
     fn default() -> Self {
-        Self { idle_polls: 1500, stopped_ns: 10_000_000_000 }
+        Self { idle_polls: 1500, next_polls: 50, stopped_ns: 10_000_000_000 }
     }
 }
 
@@ -75,6 +78,10 @@ pub(super) struct Growth {
     pub(super) polls: u32,
     pub(super) patience: Patience,
     pub(super) end: Option<LogEnd>,
+    /// Path of the file that is read.
+    part: PathBuf,
+    /// True if the footer of that file has been read.
+    is_complete: bool,
 }
 
 /// Reason why a log that was being written has ended.
@@ -93,12 +100,21 @@ pub enum LogEnd {
 }
 
 impl Growth {
-    pub(super) fn new(patience: Patience) -> Self {
-        Self { scan: ScanState::default(), scanned: 0, polls: 0, patience, end: None }
+    pub(super) fn new(path: &Path, patience: Patience) -> Self {
+        let (scan, part) = (ScanState::default(), path.to_owned());
+        Self { scan, scanned: 0, polls: 0, patience, end: None, part, is_complete: false }
+    }
+
+    /// Path of the file that is read: the first one, or another one of a split recording.
+    pub(super) fn part(&self) -> &Path {
+        &self.part
     }
 
     /// True if the file has parts that are not scanned; otherwise the log may have ended.
-    pub(super) fn has_news(&mut self, file: &LogFile, follow: &FollowOptions) -> bool {
+    pub(super) fn has_news(&mut self, file: &LogFile, index: &ContainerIndex, follow: &FollowOptions) -> bool {
+        if self.is_complete {
+            return self.goes_on(file, index, follow);
+        }
         // Asked before the length: a reception may write the rest of the log before it is over.
         let is_over = follow.reception.as_ref().map(|reception| reception.is_over());
         file.grow();
@@ -114,15 +130,66 @@ impl Growth {
         false
     }
 
+    /// True if the recording goes on in the next file of a split recording; otherwise the log may have ended.
+    fn goes_on(&mut self, file: &LogFile, index: &ContainerIndex, follow: &FollowOptions) -> bool {
+        file.grow();
+        let next = next_part(&self.part).filter(|_| follow.reception.is_none());
+        let patience = match &next {
+            None => 0,
+            Some(next) if next.exists() => self.patience.idle_polls,
+            Some(_) => self.patience.next_polls,
+        };
+        let opened = next.and_then(|next| Some((LogFile::open(&next, file.limits()).ok()?, next)));
+        if let Some((part, next)) = opened.filter(|_| file.len() >= self.scan.complete_bytes()) {
+            // A file of another flight begins at another time.
+            let begin_ns = ContainerIndex::read(&part).first_log_time_ns();
+            match begin_ns.map(|begin_ns| begin_ns.abs_diff(index.last_log_time_ns()) <= self.patience.stopped_ns) {
+                Some(true) => {
+                    self.scan = ScanState::of_part(file.append(part));
+                    (self.part, self.is_complete, self.polls) = (next, false, 0);
+                    return true;
+                }
+                Some(false) => self.polls = patience,
+                None => {}
+            }
+        }
+        let is_over = self.polls >= patience || follow.stop.load(Ordering::Relaxed);
+        self.end = is_over.then_some(LogEnd::Complete);
+        false
+    }
+
     /// Adds what has been written since; true if there are more blocks.
     pub(super) fn grow(&mut self, file: &LogFile, index: &mut ContainerIndex) -> bool {
         (self.scanned, self.polls) = (file.len(), 0);
         let before = index.blocks.len();
         self.end = match index.scan(file, &mut self.scan) {
-            ScanEnd::Footer => Some(LogEnd::Complete),
+            ScanEnd::Footer => {
+                self.is_complete = true;
+                None
+            }
             ScanEnd::Limit => Some(LogEnd::Limit),
             ScanEnd::EndOfFile | ScanEnd::Incomplete(_) => None,
         };
         index.blocks.len() > before
+    }
+}
+
+/// Path of the part that follows a part of a split recording, `flight_1.mcap` after `flight_0.mcap`.
+fn next_part(path: &Path) -> Option<PathBuf> {
+    let (stem, extension) = (path.file_stem()?.to_str()?, path.extension()?.to_str()?);
+    let (name, number) = stem.rsplit_once('_')?;
+    let next = number.parse::<u32>().ok()?.checked_add(1)?;
+    Some(path.with_file_name(format!("{name}_{next}.{extension}")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_files_of_a_split_recording_are_numbered() {
+        for (name, expected) in [("a_9.mcap", Some("a_10.mcap")), ("a.mcap", None), ("a_b.mcap", None)] {
+            assert_eq!(next_part(Path::new(name)), expected.map(PathBuf::from));
+        }
     }
 }

@@ -111,8 +111,8 @@ impl OwnedStepInput {
         self.own_bytes() + tracks_bytes(self.main_tracks())
     }
 
-    /// Memory in bytes without the main camera's tracks, which all runs on the camera share. Every run that shares the input
-    /// counts it.
+    /// Memory in bytes without the main camera's tracks, which all runs on the camera share. It is counted for every run that
+    /// shares the input.
     fn own_bytes(&self) -> usize {
         let further: usize = self.images.iter().skip(1).map(|image| tracks_bytes(&image.tracks)).sum();
         allocated_bytes(size_of::<Self>() + 2 * size_of::<usize>())

@@ -108,6 +108,14 @@ impl SessionPlan {
             None => FlightLog::open_with(&request.log_path, &request.limits)?,
             Some(follow) => FlightLog::open_following(&request.log_path, &request.limits, follow.clone())?,
         });
+        Self::of_log(request, log)
+    }
+
+    /// Finds the rigs of an open log and each run's camera.
+    ///
+    /// # Errors
+    /// As [`SessionPlan::open`].
+    pub fn of_log(request: &SessionRequest, log: Arc<FlightLog>) -> Result<Self, SessionError> {
         check_start(&log, request.start_s)?;
         let mut rig = Rig::for_log(&log, request.rig_path.as_deref())?;
         if let Some(text) = &request.required_accuracy {

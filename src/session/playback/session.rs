@@ -95,9 +95,8 @@ impl Session {
         let (log, rig) = (Arc::clone(&self.plan.log), Arc::clone(&self.plan.rig));
         let (has_begun, store) = self.shared.receiver_of_check(&log);
         let check = move || {
-            // Topics, rates and warnings of a log that was being written are those of its first seconds.
-            let complete =
-                if log.is_followed() { FlightLog::open_with(log.path(), log.file().limits()).ok() } else { None };
+            // Of a log that was being written, only topics, rates and warnings of the first seconds are known.
+            let complete = if log.is_followed() { log.reopened().ok() } else { None };
             check(&complete.map_or(log, Arc::new), &rig)
         };
         self.check = Some(BackgroundCheck::start(check, has_begun, store)?);

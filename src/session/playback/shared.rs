@@ -74,8 +74,8 @@ impl SharedComputation {
         }
     }
 
-    /// Function that is true once the check of a log may begin, when a run has a step and the log has ended, and one that
-    /// stores its findings.
+    /// Two functions: one is true once the check of a log may begin, when a run has a step and the log has ended, and the
+    /// other one stores the findings.
     pub(super) fn receiver_of_check(
         &self,
         log: &Arc<FlightLog>,

@@ -5,14 +5,14 @@ use crate::estimator::allocated_bytes;
 use crate::frontend::{FrontEndStatistics, TrackedFeature, TrackedFrame};
 
 /// Feature tracks of one camera's image in a step. The record of a long run does not own them: a run keeps the newest in
-/// memory and the others in a temporary file, from which they are read when they are drawn. They are printed alike
-/// wherever they are.
+/// memory and the others in a temporary file, from which they are read when they are drawn. Both are printed in the same
+/// way.
 #[derive(Clone)]
 pub struct StepTracks {
     /// Header stamp of the image, in nanoseconds since the log began.
     pub stamp_ns: i64,
     pub statistics: FrontEndStatistics,
-    /// Number of features.
+    /// Number of features in the image.
     pub count: usize,
     place: TracksPlace,
 }
