@@ -58,8 +58,8 @@ pub(crate) struct ParameterHistory {
     pub(crate) verdicts: Vec<Determination>,
 }
 
-/// Log time after which the motion that is still needed is computed again while the log is being written: a move has been
-/// flown by then.
+/// Log time after which the motion that is still needed is computed again while the log is being written, the duration of a
+/// move of that motion.
 const LIVE_PERIOD_NS: i64 = (1e9 * ADVICE_DURATION_S) as i64;
 
 /// Motion that brings the parameters of a run to the required accuracy.
