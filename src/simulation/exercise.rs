@@ -32,6 +32,7 @@ pub struct JointSwing {
     pub joint: usize,
     /// Amplitude to each side of the initial angle.
     pub amplitude_rad: f64,
+    pub period_s: f64,
 }
 
 /// Simultaneous swings of the vehicle and of a joint, the other joints fixed.
@@ -55,7 +56,7 @@ pub const ROCK_PERIOD_S: f64 = 1.25;
 const YAW_SWING_RAD: f64 = 20.0 * std::f64::consts::PI / 180.0;
 /// Period of the vehicle's yaw.
 const YAW_PERIOD_S: f64 = 3.3;
-/// Period of a joint's swing; in no simple ratio to the vehicle's periods, so that the two are not correlated.
+/// Period of a joint's swing in the suggested excitation; in no simple ratio to the vehicle's periods, so that the two are not correlated.
 pub const JOINT_PERIOD_S: f64 = 2.6;
 /// Time in which a swing grows to its amplitude.
 pub const GROWTH_S: f64 = 1.0;
@@ -104,6 +105,6 @@ impl Exercise {
     /// Change of a joint's angle from its start, in radians.
     pub fn joint_rad(&self, joint: usize, time_s: f64) -> f64 {
         let swung = self.joint.filter(|swung| swung.joint == joint);
-        swung.map_or(0.0, |swung| swung.amplitude_rad * swing(time_s, JOINT_PERIOD_S))
+        swung.map_or(0.0, |swung| swung.amplitude_rad * swing(time_s, swung.period_s))
     }
 }

@@ -29,8 +29,8 @@ use crate::geometry::{Dimension, seconds_from_ns};
 use crate::gimbal::{Chain, ParameterId, Parameterization};
 use crate::sensors::{ChainPrior, ImuSample, Rig};
 use crate::simulation::{
-    Exercise, JointSwing, SyntheticFlight, SyntheticFrame, SyntheticMotion, SyntheticMount, SyntheticOptions,
-    VehicleSwing, synthetic_tracks,
+    Exercise, JOINT_PERIOD_S, JointSwing, SyntheticFlight, SyntheticFrame, SyntheticMotion, SyntheticMount,
+    SyntheticOptions, VehicleSwing, synthetic_tracks,
 };
 
 pub(super) struct TestWindow {
@@ -68,7 +68,7 @@ impl TestWindow {
 
 /// Hover during which one joint swings by 15° from 4.5 s on.
 pub(super) fn joint_swing(joint: usize, duration_s: f64) -> SyntheticOptions {
-    let swing = JointSwing { joint, amplitude_rad: 15_f64.to_radians() };
+    let swing = JointSwing { joint, amplitude_rad: 15_f64.to_radians(), period_s: JOINT_PERIOD_S };
     SyntheticOptions {
         duration_s,
         features: 80,

@@ -30,7 +30,7 @@ const JOINT_SWING_RAD: f64 = 20.0 * std::f64::consts::PI / 180.0;
 /// Largest rate of a joint, in rad/s: slow for any gimbal.
 const JOINT_RATE_RAD_PER_S: f64 = 60.0 * std::f64::consts::PI / 180.0;
 /// Joints with less range than this do not move, in radians.
-const MIN_SWING_RAD: f64 = 3.0 * std::f64::consts::PI / 180.0;
+pub(super) const MIN_SWING_RAD: f64 = 3.0 * std::f64::consts::PI / 180.0;
 /// The vehicle's velocity at the start decays with this time constant, in seconds.
 const BRAKING_S: f64 = 0.8;
 
@@ -164,7 +164,7 @@ pub(super) fn candidates(situation: &Situation) -> Vec<Exercise> {
         let by_rate = JOINT_RATE_RAD_PER_S * JOINT_PERIOD_S / std::f64::consts::TAU;
         let amplitude_rad = JOINT_SWING_RAD.min(room).min(by_rate);
         if amplitude_rad >= MIN_SWING_RAD {
-            swings.push(Some(JointSwing { joint, amplitude_rad }));
+            swings.push(Some(JointSwing { joint, amplitude_rad, period_s: JOINT_PERIOD_S }));
         }
     }
     let with = |vehicle: VehicleSwing| swings.iter().map(move |joint| Exercise::full(vehicle, *joint));
@@ -268,17 +268,33 @@ fn samples(
 
 /// Describes a candidate as an instruction.
 pub(super) fn words(exercise: &Exercise, joints: &[LaboratoryJoint]) -> String {
-    let swing = exercise.joint.map(|swing| {
-        let name = joints.get(swing.joint).map_or("a joint", |joint| joint.name.as_str());
-        let size_deg = swing.amplitude_rad.to_degrees();
-        if ["yaw", "pitch", "roll", "pan", "tilt"].contains(&name) {
-            format!("{name} gimbal ±{size_deg:.0}°")
-        } else {
-            format!("rotate {name} ±{size_deg:.0}°")
-        }
-    });
+    let vehicle = vehicle_words(exercise);
+    match exercise.joint {
+        Some(swing) => format!("{}, {vehicle}", swing_words(&swing, joints)),
+        None if joints.is_empty() => vehicle,
+        None => format!("{vehicle}, gimbal fixed"),
+    }
+}
+
+/// Describes the motion of a joint to both sides.
+pub(super) fn swing_words(swing: &JointSwing, joints: &[LaboratoryJoint]) -> String {
+    format!("{} ±{:.0}°", joint_words(swing, joints), swing.amplitude_rad.abs().to_degrees())
+}
+
+/// Says which joint moves.
+pub(super) fn joint_words(swing: &JointSwing, joints: &[LaboratoryJoint]) -> String {
+    let name = joints.get(swing.joint).map_or("a joint", |joint| joint.name.as_str());
+    if ["yaw", "pitch", "roll", "pan", "tilt"].contains(&name) {
+        format!("{name} gimbal")
+    } else {
+        format!("rotate {name}")
+    }
+}
+
+/// Describes the motion of the vehicle.
+pub(super) fn vehicle_words(exercise: &Exercise) -> String {
     let (size, period_s) = (exercise.vehicle_amplitude(), ROCK_PERIOD_S);
-    let vehicle = match exercise.vehicle {
+    match exercise.vehicle {
         VehicleSwing::Hover => "hover".to_owned(),
         VehicleSwing::Forward => format!("translate forward and back ±{size:.2} m"),
         VehicleSwing::Sideways => format!("translate sideways ±{size:.2} m"),
@@ -286,11 +302,6 @@ pub(super) fn words(exercise: &Exercise, joints: &[LaboratoryJoint]) -> String {
         VehicleSwing::Roll => format!("translate sideways ±{size:.2} m every {period_s} s (roll)"),
         VehicleSwing::Pitch => format!("translate forward and back ±{size:.2} m every {period_s} s (pitch)"),
         VehicleSwing::Yaw => format!("yaw vehicle ±{:.0}°", size.to_degrees()),
-    };
-    match swing {
-        Some(swing) => format!("{swing}, {vehicle}"),
-        None if joints.is_empty() => vehicle,
-        None => format!("{vehicle}, gimbal fixed"),
     }
 }
 

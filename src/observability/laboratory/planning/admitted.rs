@@ -1,16 +1,20 @@
-//! Moves of the suggested excitation, and the same with a second joint, with the amplitudes that the limits admit.
+//! Moves of the suggested excitation and moves of two joints, with the amplitudes that the limits admit.
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::super::advice::candidates;
+use super::super::advice::{MIN_SWING_RAD, candidates};
 use super::moves::HandMove;
 use super::search::{CHECK_STEP_S, MARGIN, SearchProblem};
 use super::starts;
-use crate::simulation::MotionSplines;
+use crate::simulation::{Exercise, JointSwing, MotionSplines, VehicleSwing};
 
 /// Step at which swings are compared with the ranges of the limits, in seconds.
 const RANGE_STEP_S: f64 = 0.05;
+/// Distance that moves by hand keep from the stops of the joints, since their angles are measured with errors.
+const STOP_DISTANCE_RAD: f64 = 2.0 * std::f64::consts::PI / 180.0;
+/// Period of the swings of a second joint.
+const SECOND_JOINT_PERIOD_S: f64 = 3.7;
 
 /// The move with amplitudes at which its swings over a time are within the limits, each for itself.
 fn admitted(mut choice: HandMove, problem: &SearchProblem<'_>, duration_s: f64) -> HandMove {
@@ -21,8 +25,8 @@ fn admitted(mut choice: HandMove, problem: &SearchProblem<'_>, duration_s: f64) 
         let (low, high) = limits.range(channel);
         let middle = rest.get(channel).copied().unwrap_or(0.0);
         let times_s = (0..=(duration_s / RANGE_STEP_S) as usize).map(|step| step as f64 * RANGE_STEP_S);
-        let largest = times_s.map(|time_s| choice.change(channel, joints, time_s).abs()).fold(0.0, f64::max);
-        largest / (high - middle).min(middle - low)
+        let changes = times_s.map(|time_s| choice.change(channel, joints, time_s));
+        changes.map(|change| (change / (high - middle)).max(change / (low - middle))).fold(0.0, f64::max)
     });
     let motion = starts::as_described(problem, duration_s, &[choice]);
     let reduced = limits.reduced(MARGIN);
@@ -36,15 +40,36 @@ pub(super) fn listed(problem: &SearchProblem<'_>, duration_s: f64) -> Vec<HandMo
     all.map(|choice| admitted(choice, problem, duration_s)).collect()
 }
 
-/// The listed motions, and their combinations with a second joint.
-pub(super) fn combined(problem: &SearchProblem<'_>, duration_s: f64) -> Vec<HandMove> {
-    let one = listed(problem, duration_s);
-    let mut moves = one.clone();
-    for first in &one {
-        let Some(swing) = first.exercise.joint else { continue };
-        let others = one.iter().filter(|other| other.exercise.vehicle == first.exercise.vehicle);
-        let seconds = others.filter_map(|other| other.exercise.joint).filter(|second| second.joint > swing.joint);
-        moves.extend(seconds.map(|second| HandMove { second: Some(second), ..*first }));
+/// The listed motions, and for each swing of the vehicle the moves of two joints: one turns to one side and back, another
+/// one swings to both sides.
+pub(super) fn with_two_joints(problem: &SearchProblem<'_>, duration_s: f64) -> Vec<HandMove> {
+    let mut limits = problem.limits.clone();
+    for ((low, high), start) in limits.joints_rad.iter_mut().zip(&problem.situation.joints_rad) {
+        *low = (*low + STOP_DISTANCE_RAD).min(*start);
+        *high = (*high - STOP_DISTANCE_RAD).max(*start);
+    }
+    let problem = &SearchProblem { limits: &limits, ..*problem };
+    let mut moves = listed(problem, duration_s);
+    let joints = 0..problem.situation.joints.len();
+    let widest = |joint: usize, period_s: f64| -> Option<JointSwing> {
+        let (low, high) = problem.limits.range(joint);
+        // A turn goes to the side with more room.
+        let start = problem.situation.joints_rad[joint];
+        let amplitude_rad = if high - start < start - low { low - start } else { high - start };
+        let swing = JointSwing { joint, amplitude_rad, period_s };
+        let exercise = Exercise::full(VehicleSwing::Hover, Some(swing));
+        let admitted = admitted(HandMove { exercise, second: None }, problem, duration_s).exercise.joint;
+        admitted.filter(|swing| swing.amplitude_rad.abs() >= MIN_SWING_RAD)
+    };
+    let turns: Vec<JointSwing> = joints.clone().filter_map(|joint| widest(joint, 2.0 * duration_s)).collect();
+    let swings: Vec<JointSwing> = joints.filter_map(|joint| widest(joint, SECOND_JOINT_PERIOD_S)).collect();
+    let vehicles: Vec<Exercise> = moves.iter().map(|one| one.exercise).filter(|it| it.joint.is_none()).collect();
+    for vehicle in vehicles {
+        for turn in &turns {
+            let seconds = swings.iter().filter(|second| second.joint != turn.joint);
+            let exercise = Exercise { joint: Some(*turn), ..vehicle };
+            moves.extend(seconds.map(|second| HandMove { exercise, second: Some(*second) }));
+        }
     }
     moves
 }

@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::admitted::combined;
+use super::admitted::with_two_joints;
 use super::moves::HandMove;
 use super::search::SearchProblem;
 use super::starts;
@@ -50,7 +50,7 @@ pub(super) fn choose(
 ) -> Vec<HandMove> {
     let &SearchProblem { situation, objective, ref layout, .. } = problem;
     let columns = situation.information.ncols();
-    let candidates = combined(problem, layout.length_s);
+    let candidates = with_two_joints(problem, layout.length_s);
     let mut chosen: Vec<HandMove> = Vec::new();
     let mut windows: Vec<WindowRows> = Vec::new();
     for window in 0..layout.count {

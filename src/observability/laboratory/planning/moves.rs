@@ -1,17 +1,14 @@
-//! Moves with words: the moves of the suggested excitation, and the same with a second joint.
+//! Moves with words: the moves of the suggested excitation, and moves of two joints at once.
 
 use super::super::Situation;
-use super::super::advice::words;
+use super::super::advice::{joint_words, swing_words, vehicle_words, words};
 use crate::simulation::{Exercise, JointSwing};
-
-/// Time of the second joint relative to the first: its swings are slower, so that the two are not correlated.
-const SECOND_JOINT_TIME: f64 = 0.7;
 
 /// Swing of the vehicle with swings of up to two joints.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct HandMove {
     pub(super) exercise: Exercise,
-    /// Second joint, which swings in the same way but more slowly.
+    /// Second joint, which swings to both sides while the first one turns to one side and back.
     pub(super) second: Option<JointSwing>,
 }
 
@@ -19,7 +16,7 @@ impl HandMove {
     /// Change of a joint's angle from the start, in radians.
     pub(super) fn joint_rad(&self, joint: usize, time_s: f64) -> f64 {
         let second = Exercise { joint: self.second, ..self.exercise };
-        self.exercise.joint_rad(joint, time_s) + second.joint_rad(joint, SECOND_JOINT_TIME * time_s)
+        self.exercise.joint_rad(joint, time_s) + second.joint_rad(joint, time_s)
     }
 
     /// Change of a channel (joints, forward, left, up, heading) from the start, in radians or metres.
@@ -43,9 +40,13 @@ impl HandMove {
 
     /// The move as an instruction.
     pub(super) fn words(&self, situation: &Situation) -> String {
-        let one = words(&self.exercise, &situation.joints);
-        let Some(second) = self.second else { return one };
-        let name = situation.joints.get(second.joint).map_or("a joint", |joint| joint.name.as_str());
-        format!("{one}, and more slowly {name} ±{:.0}°", second.amplitude_rad.to_degrees())
+        let joints = &situation.joints;
+        let (Some(first), Some(second)) = (self.exercise.joint, self.second) else {
+            return words(&self.exercise, joints);
+        };
+        let (name, turn_deg) = (joint_words(&first, joints), first.amplitude_rad.to_degrees());
+        let sign = if turn_deg < 0.0 { '−' } else { '+' };
+        let (swing, vehicle) = (swing_words(&second, joints), vehicle_words(&self.exercise));
+        format!("{name} by {sign}{:.0}° and back, {swing}, {vehicle}", turn_deg.abs())
     }
 }

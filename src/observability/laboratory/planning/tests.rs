@@ -140,7 +140,7 @@ fn moves_by_hand_lower_sigma_step_by_step() {
     for pair in by_hand.steps.windows(2) {
         assert!(pair[1].value < pair[0].value, "{by_hand}");
     }
-    assert!(by_hand.steps.iter().any(|step| step.words.contains("more slowly")), "{by_hand}");
+    assert!(by_hand.steps.iter().any(|step| step.words.contains(" and back")), "{by_hand}");
     assert_eq!(by_hand.steps.last().unwrap().worst_ratio, by_hand.table.worst_ratio);
     let exceeded = |limits: &MotionLimits, motion: &MotionSplines| -> Vec<String> {
         let reached = limits.compare(motion, &situation.joint_names());
