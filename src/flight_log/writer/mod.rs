@@ -58,7 +58,7 @@ pub struct MessageTimes {
 /// Writes a log, message by message in the order of log times.
 pub struct LogWriter {
     file: McapFile<OutputFile>,
-    /// Channels by topic.
+    /// Channel of each topic that has been written to.
     channels: BTreeMap<String, u16>,
 }
 
