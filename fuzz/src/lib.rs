@@ -2,7 +2,8 @@
 //!
 //! Each takes the bytes of one input, passes them to the reader as a file or as text, and drops the result: an input is
 //! a finding if the reader panics, aborts, runs for seconds, or takes more memory than the fuzzer allows.
-//! `src/bin/seeds.rs` writes valid inputs to start from.
+//! [`seeds`] writes valid inputs to start from. The integration tests include this file, and call the functions with changed
+//! seeds.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -24,11 +25,13 @@ use dcvins::session::{RunSpec, SavedSession};
 use dcvins::text::Named as _;
 use tempfile::TempDir;
 
+pub mod seeds;
+
 /// Rig of the seed logs: a gimballed and a rigid camera of 16 × 12 pixels.
-pub const RIG: &str = include_str!("rig.yaml");
+const RIG: &str = include_str!("rig.yaml");
 
 /// Gimbal attitude sources that replace its joint angles, each from the topic of [`topic_of`].
-pub const SOURCES: [&str; 6] = [
+const SOURCES: [&str; 6] = [
     "{topic: /gimbal/quaternion, type: quaternion, frame: earth, axes: frd, vehicle: /vehicle/attitude}",
     "{topic: /pose, type: pose, frame: body, axes: flu, gimbal_axes: rdf}",
     "{topic: /gimbal/angles, type: euler, frame: vehicle, axes: frd, order: yaw=z pitch=x, unit: deg, vehicle: /vehicle/attitude}",
@@ -38,7 +41,7 @@ pub const SOURCES: [&str; 6] = [
 ];
 
 /// Rig of the seeds with an attitude in place of joint angles.
-pub fn rig_with_source(source: &str) -> String {
+fn rig_with_source(source: &str) -> String {
     RIG.replace("rostopic: /gimbal/joint_states", &format!("source: {source}"))
 }
 
@@ -145,7 +148,7 @@ pub fn message(bytes: &[u8]) {
 }
 
 /// Topic of the seed rig that carries messages of a kind.
-pub fn topic_of(kind: MessageKind) -> &'static str {
+fn topic_of(kind: MessageKind) -> &'static str {
     match kind {
         MessageKind::Imu => "/imu",
         MessageKind::Image => "/static_camera",
@@ -196,7 +199,7 @@ pub fn movie(bytes: &[u8]) {
 }
 
 /// Valid inputs of the five targets of recordings: target, name, bytes.
-pub fn recordings() -> Vec<(&'static str, &'static str, Vec<u8>)> {
+fn recordings() -> Vec<(&'static str, &'static str, Vec<u8>)> {
     let track = |axes: &str| recorders::telemetry_track(recorders::telemetry(6, axes));
     let video = || recorders::video_track(&[KEYFRAME], [96, 64]);
     let payload = recorders::telemetry(1, "YxZ").concat();
@@ -263,7 +266,7 @@ pub fn database(bytes: &[u8]) {
 }
 
 /// Files of an `EuRoC` folder, each with valid content, in the order of the first byte of an input of [`euroc`].
-pub const EUROC_FILES: [(&str, &str); 6] = [
+const EUROC_FILES: [(&str, &str); 6] = [
     (
         "imu0/data.csv",
         "#timestamp [ns],w_x,w_y,w_z,a_x,a_y,a_z\n1000,0.1,0.2,0.3,9.8,0.1,0.2\n6000,0.1,0.2,0.3,9.8,0.1,0.2\n",

@@ -1,6 +1,7 @@
 //! Integration tests, one module per feature.
 
 mod cameras;
+mod changed_inputs;
 mod check;
 mod command_line;
 mod convert;
