@@ -37,8 +37,14 @@ fn sigmas(folder: &Path, flight: usize) -> Vec<(String, f64)> {
 fn a_run_starts_from_the_posterior_of_another_one() {
     let folder = tempfile::tempdir().expect("a folder can be made");
     let (at, garden) = (folder.path(), garden());
-    dcvins(at, &["run", &garden, "--run", "minimal", "--duration", "6", "--no-timing", "-o", "a"], 0, &[]);
-    let second = ["run", &garden, "--run", "minimal", "--start", "4", "--no-timing", "--prior", "a/minimal", "-o"];
+    dcvins(
+        at,
+        &["run", &garden, "--run", "minimal", "--duration", "6", "--no-check", "--no-timing", "-o", "a"],
+        0,
+        &[],
+    );
+    let second =
+        ["run", &garden, "--run", "minimal", "--start", "4", "--no-check", "--no-timing", "--prior", "a/minimal", "-o"];
     let printed = dcvins(at, &[&second[..], &["b"]].concat(), 0, &[]).stdout;
     let printed = String::from_utf8_lossy(&printed);
     for words in ["0: rig", "1: garden.mcap (minimal)", "2: garden.mcap (minimal)"] {
