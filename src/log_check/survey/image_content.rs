@@ -226,17 +226,17 @@ impl Tile {
         for row in 1..self.side - 1 {
             let [above, here, below] = [row - 1, row, row + 1].map(|row| self.row(image, row));
             for column in 1..self.side - 1 {
+                // Without `array::map`, which is not inlined over codegen units.
                 let smooth = |line: &[u8]| {
-                    let [left, middle, right] = [column - 1, column, column + 1].map(|at| i32::from(line[at]));
+                    let (left, right) = (i32::from(line[column - 1]), i32::from(line[column + 1]));
+                    let middle = i32::from(line[column]);
                     (left + 2 * middle + right, 2 * middle - left - right)
                 };
-                let ([above, here, below], signs) = (
-                    [above, here, below].map(smooth),
-                    [column, row, column + row].map(|parity| if parity % 2 == 0 { 1 } else { -1 }),
-                );
-                differences[0].push(signs[0] * (above.1 + 2 * here.1 + below.1));
-                differences[1].push(signs[1] * (2 * here.0 - above.0 - below.0));
-                differences[2].push(signs[2] * (2 * here.1 - above.1 - below.1));
+                let (above, here, below) = (smooth(above), smooth(here), smooth(below));
+                let sign = |parity: usize| if parity.is_multiple_of(2) { 1 } else { -1 };
+                differences[0].push(sign(column) * (above.1 + 2 * here.1 + below.1));
+                differences[1].push(sign(row) * (2 * here.0 - above.0 - below.0));
+                differences[2].push(sign(column + row) * (2 * here.1 - above.1 - below.1));
             }
         }
         // The weights of each difference of an alternation add up to this.

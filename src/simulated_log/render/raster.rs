@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::view::Grid;
 use crate::geometry::RigidTransform;
-use crate::simulated_log::world::{Affine, Bounds, World};
+use crate::simulated_log::world::{Affine, Bounds, World, axes};
 
 /// Marks a sample of the sky.
 pub(super) const SKY: u32 = u32::MAX;
@@ -23,6 +23,13 @@ pub(super) struct Prepared {
     /// Sunlight at the three corners, divided by the depth.
     pub(super) sun: [f32; 3],
     pub(super) material: u32,
+}
+
+/// Product of a matrix and a vector with the roundings of nalgebra's, whose parts are not inlined over codegen units.
+#[inline]
+fn product(matrix: &Matrix3<f64>, vector: &Vector3<f64>) -> Vector3<f64> {
+    let row = |row: usize| matrix[(row, 0)] * vector.x + matrix[(row, 1)] * vector.y + matrix[(row, 2)] * vector.z;
+    Vector3::new(row(0), row(1), row(2))
 }
 
 /// Camera pose: transforms points of the world into the camera frame.
@@ -42,7 +49,7 @@ impl Eye {
 
     fn over_depth(&self, value: &Affine, inverse_depth: &Vector3<f64>) -> [f32; 3] {
         let at_centre = value.gradient.dot(&self.centre_m) + value.offset;
-        let linear = self.camera_from_world * value.gradient + inverse_depth * at_centre;
+        let linear = product(&self.camera_from_world, &value.gradient) + inverse_depth * at_centre;
         [linear.x as f32, linear.y as f32, linear.z as f32]
     }
 }
@@ -71,7 +78,7 @@ impl Frustum {
 
     /// True if a part of a sphere may be visible.
     fn may_show(&self, bounds: &Bounds, eye: &Eye) -> bool {
-        let centre_m = eye.camera_from_world * (bounds.centre_m - eye.centre_m);
+        let centre_m = product(&eye.camera_from_world, &(bounds.centre_m - eye.centre_m));
         centre_m.z + bounds.radius_m > NEAR_M && self.sides.iter().all(|side| side.dot(&centre_m) <= bounds.radius_m)
     }
 }
@@ -123,13 +130,13 @@ impl Workspace {
             if before_m <= 1e-4 {
                 continue;
             }
-            let inverse_depth = eye.camera_from_world * face.normal / -before_m;
+            let inverse_depth = product(&eye.camera_from_world, &face.normal) / -before_m;
             if !self.outline(&face.corners, &inverse_depth, eye, grid, shown) {
                 continue;
             }
             self.prepared.push(Prepared {
                 inverse_depth: [inverse_depth.x as f32, inverse_depth.y as f32, inverse_depth.z as f32],
-                texture_m: [0, 1].map(|axis: usize| eye.over_depth(&face.texture_m[axis], &inverse_depth)),
+                texture_m: axes(|axis| eye.over_depth(&face.texture_m[axis], &inverse_depth)),
                 sun: eye.over_depth(&face.sun, &inverse_depth),
                 material: face.material.0 as u32,
             });
@@ -147,7 +154,7 @@ impl Workspace {
         shown: &Range<usize>,
     ) -> bool {
         let first = self.outline_points.len();
-        let seen = |corner: &Vector3<f64>| eye.camera_from_world * (corner - eye.centre_m);
+        let seen = |corner: &Vector3<f64>| product(&eye.camera_from_world, &(corner - eye.centre_m));
         let Some(last) = corners.last() else { return false };
         let mut before = seen(last);
         for corner in corners {

@@ -48,14 +48,14 @@ impl Sensor {
         let noise = (self.options.noise / 147.8) as f32;
         let key = mix(self.seed ^ (frame_index as u64).wrapping_mul(0xA24B_AED4_963E_E407));
         let mut pixels = Vec::with_capacity(radiance.len());
-        // One random word is used for two pixels.
-        for (index, (values, shading)) in (0_u64..).zip(radiance.chunks(2).zip(self.shading.chunks(2))) {
-            let word = mix(key.wrapping_add(index));
-            for ((value, shading), part) in values.iter().zip(shading).zip([word as u32, (word >> 32) as u32]) {
-                let sum: i32 = part.to_le_bytes().into_iter().map(i32::from).sum();
-                let grey = value * shading * gain + (sum - 510) as f32 * noise;
-                pixels.push((grey + 0.5).clamp(0.0, 255.0) as u8);
-            }
+        let mut word = 0;
+        for (index, value) in (0_u64..).zip(radiance) {
+            // One random word is used for two pixels.
+            word = if index % 2 == 0 { mix(key.wrapping_add(index / 2)) } else { word >> 32 };
+            let [a, b, c, d] = (word as u32).to_le_bytes();
+            let sum = i32::from(a) + i32::from(b) + i32::from(c) + i32::from(d);
+            let grey = value * self.shading[index as usize] * gain + (sum - 510) as f32 * noise;
+            pixels.push((grey + 0.5).clamp(0.0, 255.0) as u8);
         }
         GrayImage { width: self.width, height: self.height, pixels }
     }

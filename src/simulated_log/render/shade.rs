@@ -6,7 +6,7 @@ use super::raster::{Eye, Prepared, SKY, Workspace};
 use super::shadow::ShadowMap;
 use super::view::{OFFSETS_PX, PixelRay, Rays, RenderedView, SAMPLES};
 use crate::geometry::RigidTransform;
-use crate::simulated_log::world::{Footprints, World};
+use crate::simulated_log::world::{Footprints, World, axes, lanes};
 
 /// Number of rows of pixels whose samples are drawn together.
 const BAND_ROWS: usize = 8;
@@ -102,10 +102,11 @@ impl<'a> SurfaceShader<'a> {
             if let Some(places) = &view.places {
                 let first = first_sample * view.grid.columns;
                 // Pixels outside the lens have no samples; the placeholders are not used.
-                places[row * view.width + column].map(|place| face[(place as usize).saturating_sub(first)])
+                let places = &places[row * view.width + column];
+                lanes(|sample| face[(places[sample] as usize).saturating_sub(first)])
             } else {
                 let first = (row * SAMPLES - first_sample) * view.grid.columns + column;
-                std::array::from_fn(|sample| face[first + sample * view.grid.columns])
+                lanes(|sample| face[first + sample * view.grid.columns])
             }
         };
         let Workspace { face, prepared, seen, differs, .. } = workspace;
@@ -175,7 +176,7 @@ impl<'a> SurfaceShader<'a> {
                 }
             }
             let (x, y) = (x / count, y / count);
-            let within = [0, 1].map(|axis: usize| ray.ray[axis] + ray.right[axis] * x + ray.down[axis] * y);
+            let within = axes(|axis| ray.ray[axis] + ray.right[axis] * x + ray.down[axis] * y);
             let grey = if *face == SKY {
                 self.sky(light, within)
             } else {
@@ -190,17 +191,18 @@ impl<'a> SurfaceShader<'a> {
     /// Grey values of a face along the first `count` rays.
     fn shade<const N: usize>(&self, face: &Prepared, light: &Light, at: &Rays<N>, count: usize) -> [f32; N] {
         let along = |linear: &[f32; 3]| -> [f32; N] {
-            std::array::from_fn(|k| linear[0] * at.ray[0][k] + linear[1] * at.ray[1][k] + linear[2])
+            lanes(|k| linear[0] * at.ray[0][k] + linear[1] * at.ray[1][k] + linear[2])
         };
-        let depth_m = along(&face.inverse_depth).map(|inverse| 1.0 / inverse.max(1e-5));
-        let times_depth = |values: [f32; N]| -> [f32; N] { std::array::from_fn(|k| values[k] * depth_m[k]) };
-        let place = [0, 1].map(|axis: usize| times_depth(along(&face.texture_m[axis])));
+        let inverse_depth = along(&face.inverse_depth);
+        let depth_m: [f32; N] = lanes(|k| 1.0 / inverse_depth[k].max(1e-5));
+        let times_depth = |values: [f32; N]| -> [f32; N] { lanes(|k| values[k] * depth_m[k]) };
+        let place: [[f32; N]; 2] = axes(|axis| times_depth(along(&face.texture_m[axis])));
         // Quotient rule: d(u)/d(ray) = (u's linear part − u · inverse depth's) · depth.
-        let change = |step: &[[f32; N]; 2]| {
-            [0, 1].map(|axis: usize| -> [f32; N] {
+        let change = |step: &[[f32; N]; 2]| -> [[f32; N]; 2] {
+            axes(|axis| {
                 let along =
                     |k: usize, part: usize| face.texture_m[axis][part] - place[axis][k] * face.inverse_depth[part];
-                std::array::from_fn(|k| (along(k, 0) * step[0][k] + along(k, 1) * step[1][k]) * depth_m[k])
+                lanes(|k| (along(k, 0) * step[0][k] + along(k, 1) * step[1][k]) * depth_m[k])
             })
         };
         let footprints = Footprints { centre: place, sides: [change(&at.right), change(&at.down)] };
@@ -214,18 +216,19 @@ impl<'a> SurfaceShader<'a> {
                 *grey *= shade * (1.0 / 128.0);
             }
         }
-        let mut sun = times_depth(along(&face.sun)).map(|sun| sun.clamp(0.0, 1.0));
-        let in_shadow_map: [[f32; N]; 3] = std::array::from_fn(|axis| {
+        let sun = times_depth(along(&face.sun));
+        let mut sun: [f32; N] = lanes(|k| sun[k].clamp(0.0, 1.0));
+        let in_shadow_map = |axis: usize| -> [f32; N] {
             let scaled = times_depth(along(&light.shadow_from_ray[axis]));
-            scaled.map(|place| place + light.shadow_offset[axis])
-        });
+            lanes(|k| scaled[k] + light.shadow_offset[axis])
+        };
+        let (columns, rows, heights) = (in_shadow_map(0), in_shadow_map(1), in_shadow_map(2));
         for k in 0..count.min(N) {
             if sun[k] > 0.01 {
-                let [column, row, height] = in_shadow_map.map(|axis| axis[k]);
-                sun[k] *= self.shadows.lit(column, row, height);
+                sun[k] *= self.shadows.lit(columns[k], rows[k], heights[k]);
             }
         }
-        std::array::from_fn(|k| {
+        lanes(|k| {
             let grey = greys[k] * (BRIGHTNESS * (AMBIENT + (1.0 - AMBIENT) * sun[k]));
             grey + (HAZE - grey) * (depth_m[k] / (depth_m[k] + HAZE_M))
         })
@@ -233,7 +236,7 @@ impl<'a> SurfaceShader<'a> {
 
     /// The sky: brighter upwards, with soft clouds on a plane high above.
     fn sky(&self, light: &Light, ray: [f32; 2]) -> f32 {
-        let direction = light.world_from_ray.map(|linear| dot(&linear, ray));
+        let direction: [f32; 3] = lanes(|axis| dot(&light.world_from_ray[axis], ray));
         let norm = (direction[0] * direction[0] + direction[1] * direction[1] + direction[2] * direction[2]).sqrt();
         let height = (direction[2] / norm).max(0.0);
         let base = HAZE + 26.0 * height;
@@ -242,8 +245,9 @@ impl<'a> SurfaceShader<'a> {
         let stretch = 0.0028 * 62.0 * lift;
         let side = [stretch, 0.0];
         let far = [0.0, stretch * lift];
-        let footprint = Footprints { centre: place.map(|x| [x]), sides: [side, far].map(|side| side.map(|x| [x])) };
-        let [cloud] = self.world.textures[self.world.clouds].sample(&footprint, 1).map(|grey| grey - 128.0);
-        base + cloud * (height * 3.0).min(1.0) * 0.55
+        let lane = |[x, y]: [f32; 2]| [[x], [y]];
+        let footprint = Footprints { centre: lane(place), sides: [lane(side), lane(far)] };
+        let [cloud] = self.world.textures[self.world.clouds].sample(&footprint, 1);
+        base + (cloud - 128.0) * (height * 3.0).min(1.0) * 0.55
     }
 }

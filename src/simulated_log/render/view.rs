@@ -3,6 +3,7 @@ use std::ops::Range;
 use nalgebra::Vector2;
 
 use crate::camera::CameraModel;
+use crate::simulated_log::world::{axes, lanes};
 
 /// Samples per pixel. Each has its own row and column in the pixel, so that edges in any direction are smooth.
 pub(super) const SAMPLES: usize = 8;
@@ -68,7 +69,8 @@ pub(super) struct Rays<const N: usize> {
 impl From<PixelRay> for Rays<1> {
     #[inline]
     fn from(PixelRay { ray, right, down }: PixelRay) -> Self {
-        Self { ray: ray.map(|x| [x]), right: right.map(|x| [x]), down: down.map(|x| [x]) }
+        let lane = |[x, y]: [f32; 2]| [[x], [y]];
+        Self { ray: lane(ray), right: lane(right), down: lane(down) }
     }
 }
 
@@ -173,9 +175,9 @@ impl RenderedView {
             let rays: &[[f32; 2]] = &here[columns.start..=columns.start + N];
             let below: &[[f32; 2]] = &line(row + 1)[columns.start..][..N];
             return Rays {
-                ray: [0, 1].map(|axis: usize| std::array::from_fn(|k| rays[k][axis])),
-                right: [0, 1].map(|axis: usize| std::array::from_fn(|k| rays[k + 1][axis] - rays[k][axis])),
-                down: [0, 1].map(|axis: usize| std::array::from_fn(|k| below[k][axis] - rays[k][axis])),
+                ray: axes(|axis| lanes(|k| rays[k][axis])),
+                right: axes(|axis| lanes(|k| rays[k + 1][axis] - rays[k][axis])),
+                down: axes(|axis| lanes(|k| below[k][axis] - rays[k][axis])),
             };
         }
         let mut rays = Rays { ray: [[0.0; N]; 2], right: [[0.0; N]; 2], down: [[0.0; N]; 2] };

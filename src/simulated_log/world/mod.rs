@@ -11,7 +11,7 @@ mod texture;
 mod town;
 
 pub(crate) use mesh::{Affine, Bounds, World};
-pub(crate) use texture::Footprints;
+pub(crate) use texture::{Footprints, axes, lanes};
 
 use crate::simulation::experiment::{Environment, WorldKind};
 
