@@ -55,6 +55,7 @@ fn sizes(kind: FaultKind) -> Sizes {
         FaultKind::CameraDrift => Not("images would have to be exposed by a clock of another rate"),
         FaultKind::Chain => Not("a distance and an angle have no direction"),
         FaultKind::ImuIntrinsics => Not("it has no values"),
+        FaultKind::ImagesExchanged => Not("the topics of the rig are exchanged, which no correction does"),
         FaultKind::UnusableImu | FaultKind::UnusableJoints | FaultKind::UnusableImages => {
             Not("no correction describes the measurements")
         }

@@ -163,6 +163,10 @@ impl Subject<'_> {
             FaultKind::UnusableImages => {
                 texts("the images cannot be restored", "record whole images in grey or colour")
             }
+            FaultKind::ImagesExchanged => texts(
+                format!("the images of {camera} and of another camera are exchanged"),
+                "exchange rostopic of the two cameras in the rig, or the topics in the driver",
+            ),
         }
     }
 

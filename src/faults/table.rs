@@ -74,6 +74,8 @@ pub enum FaultKind {
     UnusableJoints,
     /// Images that do not show the scene at one instant in grey values.
     UnusableImages,
+    /// Images of two cameras, each under the topic of the other.
+    ImagesExchanged,
 }
 
 /// Sensor with the faulty measurements.
@@ -333,6 +335,7 @@ pub const TABLE: &[Row] = &[
     Row::new(FaultKind::UnusableImu, "unusable_imu", Sensor::Imu, Area::Imu).useless(0.0),
     Row::new(FaultKind::UnusableJoints, "unusable_joints", Sensor::Joints, Area::Encoders).useless(0.0),
     Row::new(FaultKind::UnusableImages, "unusable_images", Sensor::Camera, Area::Images).useless(0.0),
+    Row::new(FaultKind::ImagesExchanged, "images_exchanged", Sensor::Camera, Area::Images).useless(0.0),
 ];
 
 const NOISE_FACTORS: &[f64] = &[3.0, 10.0, 30.0];

@@ -285,7 +285,7 @@ fn fit_of_directions(angles_rad: &[[f64; 2]]) -> Option<Fit> {
 
 /// Adds the finding in place of those that say that rotations, or the motion of the ground truth, are unexplained.
 fn report(statement: Statement, findings: &mut Findings) {
-    let fault = statement.fault();
+    let faults = statement.faults();
     let mut evidence = statement.evidence;
     let of_motion = statement.suspected.iter().any(|it| matches!(it, Source::Accelerometer | Source::Positions));
     let is_replaced = |finding: &Finding| finding.faults.is_empty() && (!of_motion || statement.area == finding.area);
@@ -293,6 +293,6 @@ fn report(statement: Statement, findings: &mut Findings) {
         evidence = format!("{evidence}; {}", finding.evidence);
     }
     findings.add(statement.severity, statement.area, statement.title, evidence, statement.remedy);
-    findings.state_faults(fault);
+    findings.state_faults(faults);
     findings.state_times(statement.interval.since_s, statement.interval.until_s);
 }

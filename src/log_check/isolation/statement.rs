@@ -158,16 +158,19 @@ impl Statement {
         }
     }
 
-    /// Fault of the only sensor that is wrong: the cause, or that its cause is not known; `None` for several sources, for images,
-    /// whose causes a run may find, and for ground truth.
-    pub(super) fn fault(&self) -> Option<Fault> {
-        if self.cause.is_some() {
-            return self.cause.clone();
-        }
-        match self.suspected.as_slice() {
-            [Source::Gyroscope | Source::Accelerometer] => Some(FaultKind::UnusableImu.into()),
-            [Source::Joint { joint, .. }] => Some(Fault::from(FaultKind::UnusableJoints).of_joints([joint])),
-            _ => None,
+    /// Fault of the only sensor that is wrong, or of each of two exchanged cameras: the cause, or that its cause is not known;
+    /// none for several sources, for images, whose causes a run may find, and for ground truth.
+    pub(super) fn faults(&self) -> Vec<Fault> {
+        match (&self.cause, self.suspected.as_slice()) {
+            (Some(cause), [Source::Images { camera_key: one, .. }, Source::Images { camera_key: other, .. }])
+                if cause.kind == FaultKind::ImagesExchanged =>
+            {
+                [one, other].map(|key| cause.clone().of_camera(key)).into()
+            }
+            (Some(cause), _) => vec![cause.clone()],
+            (None, [Source::Gyroscope | Source::Accelerometer]) => vec![FaultKind::UnusableImu.into()],
+            (None, [Source::Joint { joint, .. }]) => vec![Fault::from(FaultKind::UnusableJoints).of_joints([joint])],
+            _ => Vec::new(),
         }
     }
 
@@ -218,7 +221,7 @@ impl Statement {
             format!("{}; {}", of(first, misfits[0]), of(second, misfits[1])),
             format!("exchange rostopic of {first} and {second} in the rig, or the topics in the driver"),
             suspected,
-            None,
+            Some(FaultKind::ImagesExchanged.into()),
         )
     }
 }

@@ -161,6 +161,10 @@ mod tests {
         let errors = [focal("cam7"), reversed, joints].map(|fault| finding(Severity::Error, &[fault]));
         assert_eq!(undone("auto:encoder=off", &errors), (Vec::new(), false));
         assert_eq!(undone("auto", &errors), (vec!["correct=reversed:yaw".to_owned()], true));
+        let exchanged = |key: &str| Fault::from(FaultKind::ImagesExchanged).of_camera(key);
+        let of_two = |other: &str| [finding(Severity::Error, &[exchanged(other), exchanged("cam8")])];
+        assert_eq!(undone("auto", &of_two("cam0")), (Vec::new(), true));
+        assert_eq!(undone("auto", &of_two("cam7")), (Vec::new(), false));
         let readout = finding(Severity::Error, &[Fault::from(FaultKind::Shutter).of_camera("cam0")]);
         assert_eq!(undone("auto:readout=on", &[readout]), (Vec::new(), false));
     }
