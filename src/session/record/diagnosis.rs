@@ -119,6 +119,8 @@ pub struct Diagnosis {
     pub not_tried: Vec<FaultKind>,
 }
 
+/// Why a fault that only a correction of the log undoes has no trials.
+const ONLY_IN_LOG: &str = "no change of a run undoes this fault: correct it in the log, then diagnose again";
 /// Causes that a text lists beside those that explain the residuals.
 const LISTED: usize = 4;
 
@@ -138,10 +140,7 @@ impl fmt::Display for Diagnosis {
             }
         }
         if self.verdict == DiagnosisVerdict::LogFault {
-            writeln!(
-                out,
-                "  no trials    no change of a run undoes this fault: correct it in the log, then diagnose again"
-            )?;
+            writeln!(out, "  no trials    {ONLY_IN_LOG}")?;
         }
         for waiting in self.waiting.iter().take(3) {
             writeln!(out, "  waits        {} ({} images)", waiting.reason, waiting.images)?;
@@ -160,16 +159,7 @@ impl fmt::Display for Diagnosis {
                 writeln!(out, "     remedy     {}", cause.remedy)?;
             }
         }
-        if let Some((from_s, to_s)) = self.span_s {
-            let ended = match self.ended_after_s {
-                _ if self.interrupted => "; stopped early".to_owned(),
-                Some(after_s) => format!("; ended after about {after_s:.0} s of processor time{}", self.left_out()),
-                None if self.measured => ", for the faults that the check measures".to_owned(),
-                None => String::new(),
-            };
-            writeln!(out, "  tried        {} changes from {from_s:.2} to {to_s:.2} s{ended}", self.trials)?;
-        }
-        Ok(())
+        self.tried().map_or(Ok(()), |text| writeln!(out, "  tried        {text}"))
     }
 }
 
@@ -197,6 +187,24 @@ impl Diagnosis {
             _ => "refined values".to_owned(),
         };
         format!("stopped; so far {known}; not tried: {open}")
+    }
+
+    /// What was tried and what was left out; `None` without trials.
+    fn tried(&self) -> Option<String> {
+        let (from_s, to_s) = self.span_s?;
+        let ended = match self.ended_after_s {
+            _ if self.interrupted => "; stopped early".to_owned(),
+            Some(after_s) => format!("; ended after about {after_s:.0} s of processor time{}", self.left_out()),
+            None if self.measured => ", for the faults that the check measures".to_owned(),
+            None => String::new(),
+        };
+        Some(format!("{} changes from {from_s:.2} to {to_s:.2} s{ended}", self.trials))
+    }
+
+    /// Sentence about the trials and what they left out, or why there are none; `None` for a run without residuals.
+    pub fn trials_in_words(&self) -> Option<String> {
+        let is_in_log = self.verdict == DiagnosisVerdict::LogFault;
+        self.tried().map(|text| format!("tried {text}")).or_else(|| is_in_log.then(|| ONLY_IN_LOG.to_owned()))
     }
 
     fn not_tried_in_words(&self) -> String {

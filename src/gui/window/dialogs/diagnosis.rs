@@ -68,6 +68,9 @@ fn result_ui(ui: &mut Ui, ctx: &mut PanelContext<'_>, run: usize, found: &Diagno
             is_forked |= cause_ui(ui, ctx, run, cause, place < found.explaining);
         }
     });
+    if let Some(text) = found.trials_in_words() {
+        ui.add(Label::new(RichText::new(capitalized(&text)).color(theme.text_weak)).wrap());
+    }
     ui.add_space(6.0);
     let is_closed = ui.horizontal(|ui| {
         if ui.button("Diagnose again").clicked() {
@@ -146,13 +149,13 @@ mod tests {
             waiting: Vec::new(),
             accuracy: None,
             ground_truth: None,
-            span_s: None,
+            span_s: Some((2.0, 6.5)),
             explaining: 1,
             causes: vec![cause],
             trials: 40,
             interrupted: false,
-            ended_after_s: None,
-            not_tried: Vec::new(),
+            ended_after_s: Some(61.0),
+            not_tried: vec![FaultKind::ImuNoise],
         }
     }
 
@@ -185,6 +188,9 @@ mod tests {
                 .count()
                 > 0
         );
+        let ended =
+            "Tried 40 changes from 2.00 to 6.50 s; ended after about 61 s of processor time; not tried: imu noise";
+        assert!(harness.query_all_by_label(ended).count() > 0);
         let pushed = commands_of(&mut harness, |harness| harness.get_by_label("Fork").click());
         let changes = diagnosis().causes[0].changes.clone();
         let expected = [Command::Seek { stamp_ns: 2 * SECOND_NS }, Command::Fork { run: 0, changes, label: None }];
