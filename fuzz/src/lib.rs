@@ -352,7 +352,7 @@ pub fn condition(bytes: &[u8]) {
 pub fn trajectory(bytes: &[u8]) {
     let folder = folder();
     let estimate = write(&folder.path().join("input.tum"), bytes);
-    let poses: String = (0..5).map(|index| format!("{}.0 {index} 0 0 0 0 0 1\n", index + 1)).collect();
-    let reference = write(&folder.path().join("reference.tum"), poses.as_bytes());
+    let poses = [1, 2, 3, 4, 5].map(|stamp_s| format!("{stamp_s}.0 {} 0 0 0 0 0 1\n", stamp_s - 1));
+    let reference = write(&folder.path().join("reference.tum"), poses.concat().as_bytes());
     drop(export::evaluate(&estimate, &reference, &EvaluationOptions::default()));
 }
