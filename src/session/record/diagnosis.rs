@@ -119,7 +119,7 @@ pub struct Diagnosis {
     pub not_tried: Vec<FaultKind>,
 }
 
-/// Why a fault that only a correction of the log undoes has no trials.
+/// Remark in place of trials about a fault that only a correction of the log undoes.
 const ONLY_IN_LOG: &str = "no change of a run undoes this fault: correct it in the log, then diagnose again";
 /// Causes that a text lists beside those that explain the residuals.
 const LISTED: usize = 4;
@@ -189,7 +189,7 @@ impl Diagnosis {
         format!("stopped; so far {known}; not tried: {open}")
     }
 
-    /// What was tried and what was left out; `None` without trials.
+    /// Number of trials, their span and the causes that were left out, as text; `None` without trials.
     fn tried(&self) -> Option<String> {
         let (from_s, to_s) = self.span_s?;
         let ended = match self.ended_after_s {
